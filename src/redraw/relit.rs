@@ -8,62 +8,31 @@ use rustc_hash::{FxHashMap, FxHashSet};
 
 use super::cut::{DrawnCut, NodeUpdate};
 use super::nodes::State;
-use crate::lattice::{BRICK, ChunkGrid, ChunkPos, Column, ItemCost, SNAP, TilePos, parallel_map};
+use crate::lattice::{ChunkGrid, ChunkPos, Column, ItemCost, SNAP, TilePos, parallel_map};
 use crate::lod::Node;
 use crate::surface::lod;
-use crate::world::sky::{LightChange, LitWorld, REACH, SkyLights, SkyView, SparseSky};
+use crate::world::sky::{ChangedBox, LightChange, LitWorld, REACH, SkyLights, SkyView, SparseSky};
 use crate::world::{MeshKey, World};
 
 /// Rectangles of columns of at most this many along a side are compared as one, and with larger ones each tile for itself.
 const MAX_TOGETHER: i32 = 128;
 
-/// Stacks of bricks that change.
-#[derive(Clone, Copy)]
-struct Area {
-    /// Their columns, both ends included.
-    low: Column,
-    high: Column,
-    /// Where the highest changed brick ends, in 1/256 voxel.
-    highest: i32,
+/// The tiles that draw columns whose light may change.
+fn tiles(area: &ChangedBox, grid: ChunkGrid) -> impl Iterator<Item = TilePos> {
+    let (low, high) = area.lit();
+    let [low, high] = [low, high].map(|column| grid.chunk_of(column.at(0)));
+    // A tile's last columns are the first of the next one.
+    let all = (low.x - 1..=high.x).flat_map(move |x| (low.z - 1..=high.z).map(move |z| TilePos { x, z }));
+    all.filter(move |tile| grid.has_tile(*tile))
 }
 
-impl Area {
-    fn union(self, other: Self) -> Self {
-        Self {
-            low: Column::new(self.low.x.min(other.low.x), self.low.z.min(other.low.z)),
-            high: Column::new(self.high.x.max(other.high.x), self.high.z.max(other.high.z)),
-            highest: self.highest.max(other.highest),
-        }
-    }
-
-    /// The columns whose light may change, both ends included.
-    fn lit(self) -> (Column, Column) {
-        (self.low.offset(-REACH, -REACH), self.high.offset(REACH, REACH))
-    }
-
-    /// The tiles that draw columns whose light may change.
-    fn tiles(self, grid: ChunkGrid) -> impl Iterator<Item = TilePos> {
-        let (low, high) = self.lit();
-        let [low, high] = [low, high].map(|column| grid.chunk_of(column.at(0)));
-        // A tile's last columns are the first of the next one.
-        let all = (low.x - 1..=high.x).flat_map(move |x| (low.z - 1..=high.z).map(move |z| TilePos { x, z }));
-        all.filter(move |tile| grid.has_tile(*tile))
-    }
-
-    /// What it changes in the light of some of these columns, both ends included; `None` if none of them is in the world.
-    fn change(self, lit: &LitWorld, (low, high): (Column, Column)) -> Option<LightChange<'_>> {
-        let (grid, own) = (lit.before().grid(), self.lit());
-        let low = Column::new(low.x.max(own.0.x).max(0), low.z.max(own.0.z).max(0));
-        let high = Column::new(high.x.min(own.1.x).min(grid.width()), high.z.min(own.1.z).min(grid.depth()));
-        let is_any = low.x <= high.x && low.z <= high.z;
-        is_any.then(|| LightChange::new(lit, (low, high), (self.low, self.high), self.highest))
-    }
-}
-
-/// The stacks that a commit changes, in no order.
-fn areas(lit: &LitWorld) -> impl Iterator<Item = Area> {
-    let area = |(low, highest): (Column, i32)| Area { low, high: low.offset(BRICK - 1, BRICK - 1), highest };
-    lit.changed_stacks().map(area)
+/// What an area changes in the light of some columns, both ends included; `None` if none of them is in the world.
+fn change(lit: &LitWorld, area: ChangedBox, (low, high): (Column, Column)) -> Option<LightChange<'_>> {
+    let (grid, own) = (lit.before().grid(), area.lit());
+    let low = Column::new(low.x.max(own.0.x).max(0), low.z.max(own.0.z).max(0));
+    let high = Column::new(high.x.min(own.1.x).min(grid.width()), high.z.min(own.1.z).min(grid.depth()));
+    let is_any = low.x <= high.x && low.z <= high.z;
+    is_any.then(|| LightChange::new(lit, (low, high), area))
 }
 
 /// What a tile and its chunks draw of a world, without what a commit redraws anyway.
@@ -76,11 +45,12 @@ struct Unchanged {
 /// The tiles and chunks whose light differs after a commit, in order, without those that it redraws anyway.
 pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool + Sync) -> Vec<MeshKey> {
     let (world, grid) = (lit.before(), lit.before().grid());
-    let Some(all) = areas(lit).reduce(Area::union) else { return Vec::new() };
+    let areas = lit.changes();
+    let Some(all) = areas.iter().copied().reduce(ChangedBox::union) else { return Vec::new() };
     let is_one = (all.high.x - all.low.x).max(all.high.z - all.low.z) <= MAX_TOGETHER - 2 * REACH;
-    let mut by_tile: FxHashMap<TilePos, (Area, Vec<ChunkPos>)> = FxHashMap::default();
-    let mut add = |area: Area| {
-        for tile in area.tiles(grid) {
+    let mut by_tile: FxHashMap<TilePos, (ChangedBox, Vec<ChunkPos>)> = FxHashMap::default();
+    let mut add = |area: ChangedBox| {
+        for tile in tiles(&area, grid) {
             let own = by_tile.entry(tile).or_insert_with(|| (area, Vec::new()));
             own.0 = own.0.union(area);
         }
@@ -88,7 +58,7 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool +
     if is_one {
         add(all);
     } else {
-        areas(lit).for_each(&mut add);
+        areas.into_iter().for_each(&mut add);
     }
     let (low, high) = all.lit();
     let [low, high] = [low, high].map(|column| grid.chunk_of(column.at(0)));
@@ -101,16 +71,16 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool +
     let parts = by_tile.into_iter().map(|(tile, (area, chunks))| {
         (Unchanged { tile, is_tile_drawn: !is_redrawn(MeshKey::Tile(tile)), chunks }, area)
     });
-    let mut parts: Vec<(Unchanged, Area)> = parts.collect();
+    let mut parts: Vec<(Unchanged, ChangedBox)> = parts.collect();
     parts.retain(|(own, _)| own.is_tile_drawn || !own.chunks.is_empty());
     let mut found = if is_one {
-        let change = if parts.is_empty() { None } else { all.change(lit, all.lit()) };
+        let change = if parts.is_empty() { None } else { change(lit, all, all.lit()) };
         change.map_or(Vec::new(), |mut change| {
             parts.iter().flat_map(|(own, _)| own.relit(world, &mut change)).collect()
         })
     } else {
         let relit = parallel_map(&parts, ItemCost::Surface, |(own, area)| {
-            let change = area.change(lit, grid.tile_cells(own.tile));
+            let change = change(lit, *area, grid.tile_cells(own.tile));
             change.map_or(Vec::new(), |mut change| own.relit(world, &mut change))
         });
         relit.concat()
@@ -152,7 +122,7 @@ pub(crate) fn relit_nodes(
     drawn: &DrawnCut,
     is_redrawn: impl Fn(Node) -> bool,
 ) -> Vec<NodeUpdate> {
-    let areas: Vec<Area> = areas(lit).collect();
+    let areas = lit.changes();
     let mut nodes: FxHashSet<Node> = FxHashSet::default();
     for area in &areas {
         let (low, high) = area.lit();
@@ -178,14 +148,14 @@ pub(crate) fn relit_nodes(
     updates.into_iter().filter(|update| differs(update)).collect()
 }
 
-/// Stacks of bricks over which light may change: a long path has thousands of areas, and a vertex is near few of them.
+/// Boxes near which light may change: a long path has thousands of areas, and a vertex is near few of them.
 #[cfg_attr(not(feature = "plugin"), allow(dead_code))]
-struct NearAreas<'a>(FxHashMap<(i32, i32), Vec<&'a Area>>);
+struct NearAreas<'a>(FxHashMap<(i32, i32), Vec<&'a ChangedBox>>);
 
 #[cfg_attr(not(feature = "plugin"), allow(dead_code))]
 impl<'a> NearAreas<'a> {
-    fn of(areas: &'a [Area]) -> Self {
-        let mut near: FxHashMap<(i32, i32), Vec<&Area>> = FxHashMap::default();
+    fn of(areas: &'a [ChangedBox]) -> Self {
+        let mut near: FxHashMap<(i32, i32), Vec<&ChangedBox>> = FxHashMap::default();
         for area in areas {
             let (low, high) = area.lit();
             for x in low.x >> 3..=high.x >> 3 {

@@ -1,120 +1,14 @@
 //! The rules of sky light.
 
 use glam::IVec3;
-use rustc_hash::FxHashMap;
 
 use super::SkyView;
+use super::air::AirMemory;
+use super::horizon::{FAR, NEAR, Step, below, capped, light_of, slope};
 use crate::lattice::{Column, ONE, SNAP};
 
 /// No light depends on ground that is further away than this, in columns along x or z.
 pub(crate) const REACH: i32 = 17;
-
-/// A column at some distance, and what its top counts.
-#[derive(Clone, Copy)]
-pub(super) struct Step {
-    pub dx: i32,
-    pub dz: i32,
-    /// Multiplied by a rise in 1/128 voxel, and divided by 65,536, it gives the slope in 1/32.
-    pub factor: i16,
-    /// That factor eight times, one for each of eight columns: from an array, compilers multiply all of them at once.
-    pub factors: [i16; 8],
-}
-
-const fn step((x, z): (i32, i32), columns: i32, factor: i16) -> Step {
-    Step { dx: x * columns, dz: z * columns, factor, factors: [factor; 8] }
-}
-
-/// The directions in which horizons are looked for.
-const DIRECTIONS: [(i32, i32); 8] = [(1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1)];
-
-/// A straight direction has 16,384 / distance, a diagonal one that over the square root of 2.
-const fn steps<const N: usize>(straight: [i32; N], diagonal: [i32; N]) -> [[Step; N]; 8] {
-    let mut all = [[step((0, 0), 0, 0); N]; 8];
-    let mut direction = 0;
-    while direction < 8 {
-        let mut at = 0;
-        while at < N {
-            let is_straight = direction % 2 == 0;
-            let columns = if is_straight { straight[at] } else { diagonal[at] };
-            let factor = if is_straight { 16_384 } else { 11_585 } / columns;
-            all[direction][at] = step(DIRECTIONS[direction], columns, factor as i16);
-            at += 1;
-        }
-        direction += 1;
-    }
-    all
-}
-
-/// Where ground counts everywhere. Few columns, as coarse nodes have to look at all of them too.
-pub(super) const FAR: [[Step; 2]; 8] = steps([4, 16], [4, 12]);
-
-/// Where ground also counts if it was dug or built, or if it is seen from ground that was.
-pub(super) const NEAR: [[Step; 6]; 8] = steps([1, 2, 3, 6, 8, 11], [1, 2, 3, 5, 7, 9]);
-
-/// The slope, in 1/32, from height `y` to a top, both in 1/256 voxel.
-#[inline(always)]
-pub(super) fn slope(top: i32, y: i32, factor: i16) -> i16 {
-    let rise = ((top - y) >> 1).clamp(i16::MIN.into(), i16::MAX.into()) as i16;
-    ((i32::from(rise) * i32::from(factor)) >> 16) as i16
-}
-
-/// Raises the horizons of eight columns, whose heights are `ys`, to the tops that lie a step away.
-#[inline(always)]
-pub(super) fn raise(horizons: &mut [i16; 8], tops: &[i32; 8], ys: &[i32; 8], step: &Step) {
-    for at in 0..8 {
-        horizons[at] = horizons[at].max(slope(tops[at], ys[at], step.factors[at]));
-    }
-}
-
-/// Raises the horizons of eight columns like [`raise`], where a bit of one of two masks is set.
-#[inline(always)]
-pub(super) fn raise_where(
-    masks: [&[i16; 8]; 2],
-    horizons: &mut [i16; 8],
-    tops: &[i32; 8],
-    ys: &[i32; 8],
-    step: &Step,
-) {
-    for at in 0..8 {
-        let slope = slope(tops[at], ys[at], step.factors[at]) & (masks[0][at] | masks[1][at]);
-        horizons[at] = horizons[at].max(slope);
-    }
-}
-
-/// Horizons of this slope or less, in 1/32, hide nothing.
-const LOWEST_HORIZON: i16 = 2;
-
-/// Adds what eight horizons hide.
-#[inline(always)]
-pub(super) fn hide(hidden: &mut [u16; 8], horizons: &[i16; 8]) {
-    if horizons.iter().fold(0, |highest, &horizon| horizon.max(highest)) > LOWEST_HORIZON {
-        hidden.iter_mut().zip(horizons).for_each(|(sum, &horizon)| *sum += below(horizon));
-    }
-}
-
-/// For each slope of a horizon, in 1/32, the share of the sky in its direction that lies below: the square of its sine.
-static BELOW: [u8; 256] = {
-    let mut table = [0; 256];
-    let mut slope = 0;
-    while slope < 256 {
-        let squared = (slope * slope) as u32;
-        table[slope] = (255 * squared / (squared + 32 * 32)) as u8;
-        slope += 1;
-    }
-    table
-};
-
-/// Of a direction with this horizon, the share of the sky that lies below it, 0..=255.
-#[inline(always)]
-pub(super) fn below(slope: i16) -> u16 {
-    BELOW[slope.clamp(0, 255) as usize].into()
-}
-
-/// The light where these shares of the sky are hidden in all directions together.
-#[inline(always)]
-pub(super) fn light_of(hidden: u16) -> u8 {
-    255 - (hidden / 8) as u8
-}
 
 /// The light of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -150,13 +44,17 @@ pub(crate) trait SkyLights {
     fn top(&mut self, column: Column) -> i32;
     /// Whether that is not the ground's own height.
     fn is_changed(&mut self, column: Column) -> bool;
+    /// Whether a sample is solid.
+    fn is_solid(&mut self, point: IVec3) -> bool {
+        self.view().is_solid(point)
+    }
     /// The light on top of a column.
     fn top_light(&mut self, column: Column) -> u8 {
         let y = self.top(column);
         self.open_light(column, y)
     }
     /// The light of points under roofs that is known already; `None` for solid ones.
-    fn known(&mut self) -> &mut FxHashMap<IVec3, Option<AirLight>>;
+    fn known(&mut self) -> &mut AirMemory<Option<AirLight>>;
 
     /// The light over a column at a height, in 1/256 voxel, that is not below its top.
     fn open_light(&mut self, column: Column, y: i32) -> u8 {
@@ -173,7 +71,7 @@ pub(crate) trait SkyLights {
                     horizon = horizon.max(slope(self.top(other), y, factor));
                 }
             }
-            hidden += below(horizon);
+            hidden += below(capped(horizon));
         }
         light_of(hidden)
     }
@@ -244,27 +142,19 @@ pub(crate) trait SkyLights {
     /// The light of a place under a roof by rays, if ground around it may be low enough to let light in: a mean of the
     /// corners of its cube of 2x2x2 voxels that are air.
     fn covered_light_by_rays(&mut self, place: IVec3, columns: [Column; 2]) -> Light {
-        const SIDE: i32 = 2 * SNAP;
-        let low = place.y.div_euclid(SNAP);
-        let heights = [low + i32::from(place.y.rem_euclid(SNAP) > 0), low];
-        let view = self.view();
-        let points = heights.into_iter().flat_map(|y| columns.map(|column| column.at(y)));
-        let Some(air) = { points }.find(|&point| !view.is_solid(point)) else { return Light::NONE };
-        let first = place.div_euclid(IVec3::splat(SIDE)) * 2;
-        let part = place.rem_euclid(IVec3::splat(SIDE));
+        let Some(air) = self.air_beside(place, columns) else { return Light::NONE };
+        let first = first_corner(place);
+        let part = part_of_cube(place);
+        let weights = [IVec3::splat(SIDE) - part, part].map(|near| near.to_array().map(|near| near as u64));
         let (mut sky, mut daylight, mut sum) = (0, 0, 0);
-        for corner in 0..8 {
-            let side = IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2);
-            let near = (IVec3::ONE - side) * SIDE + (2 * side - 1) * part;
-            let weight = near.to_array().map(|near| near as u64).into_iter().product::<u64>();
-            if weight == 0 {
-                continue;
-            }
+        for side in corners_around(part) {
+            let [x, y, z] = side.to_array().map(|side| side as usize);
+            let weight = weights[x][0] * weights[y][1] * weights[z][2];
             let point = first + 2 * side;
             let Some(AirLight { light, is_under_open_sky }) = self.air_light(point) else { continue };
             // A corner behind a thin roof or wall is left out.
             let middle = (point + air + (point - air).signum().max(IVec3::ZERO)) >> 1;
-            if is_under_open_sky && self.view().is_solid(middle) {
+            if is_under_open_sky && self.is_solid(middle) {
                 continue;
             }
             sky += weight * u64::from(light.sky);
@@ -277,37 +167,37 @@ pub(crate) trait SkyLights {
         Light { sky: (sky / sum) as u8, daylight: (daylight / sum) as u8 }
     }
 
+    /// A point of air next to a place between two columns, if there is one.
+    fn air_beside(&mut self, place: IVec3, columns: [Column; 2]) -> Option<IVec3> {
+        let low = place.y.div_euclid(SNAP);
+        let heights = [low + i32::from(place.y.rem_euclid(SNAP) > 0), low];
+        let points = heights.into_iter().flat_map(|y| columns.map(|column| column.at(y)));
+        { points }.find(|&point| !self.is_solid(point))
+    }
+
     /// The light at a point, by rays; `None` if it is solid.
     fn air_light(&mut self, point: IVec3) -> Option<AirLight> {
-        if let Some(&known) = self.known().get(&point) {
+        if let Some(known) = self.known().get(point) {
             return known;
         }
-        let is_air = !self.view().is_solid(point);
+        let is_air = !self.is_solid(point);
         let light = is_air.then(|| AirLight {
             light: self.ray_light(point),
             is_under_open_sky: self.top(Column::of(point)) <= point.y * ONE,
         });
-        self.known().insert(point, light);
+        self.known().keep(point, light);
         light
     }
 
     /// The share of rays from a point that get out.
     fn ray_light(&mut self, from: IVec3) -> Light {
-        let mut open = 0;
-        for (number, &direction) in AROUND.iter().step_by(2).enumerate() {
-            for (steps, rise) in RAYS[number % 2] {
-                open += u32::from(self.escapes(from, direction, steps, rise));
-            }
-        }
+        let open: u32 = (0..DIRECTION_COUNT).step_by(2).map(|number| self.open_rays(from, number)).sum();
         let sky = open * 255 / (8 * RAYS[0].len() as u32);
-        let share = |directions: u32| directions * 255 / AROUND.len() as u32;
+        let share = |directions: u32| directions * 255 / DIRECTION_COUNT as u32;
         let mut seen = 0;
         if sky < share(MAX_LEVEL) {
-            for (number, &direction) in AROUND.iter().enumerate() {
-                let (steps, rise) = LEVEL_RAYS[number % 4];
-                let may_escape = from.y * ONE + steps * rise >= self.top(along(from, direction, steps));
-                let mut rises = [0, rise, -rise].into_iter();
-                seen += u32::from(may_escape && rises.any(|rise| self.escapes(from, direction, steps, rise)));
+            for number in 0..DIRECTION_COUNT {
+                seen += u32::from(self.sees_open(from, number));
                 if seen == MAX_LEVEL {
                     break;
                 }
@@ -316,22 +206,42 @@ pub(crate) trait SkyLights {
         Light { sky: sky as u8, daylight: sky.max(share(seen)) as u8 }
     }
 
+    /// How many rays towards the sky get out in a straight or diagonal direction, given its number in [`AROUND`].
+    fn open_rays(&mut self, from: IVec3, number: usize) -> u32 {
+        let rays = RAYS[number / 2 % 2].into_iter();
+        rays.map(|(steps, rise)| u32::from(self.escapes(from, AROUND[number], steps, rise))).sum()
+    }
+
+    /// Whether the open is seen by a level ray or one next to it, given the number of its direction in [`AROUND`].
+    fn sees_open(&mut self, from: IVec3, number: usize) -> bool {
+        let (direction, (steps, rise)) = (AROUND[number], LEVEL_RAYS[number % 4]);
+        let may_escape = from.y * ONE + steps * rise >= self.top(along(from, direction, steps));
+        may_escape && [0, rise, -rise].into_iter().any(|rise| self.escapes(from, direction, steps, rise))
+    }
+
     /// Whether a ray leads to the open, given its direction in half columns, its number of steps and its rise in each
     /// of them, in 1/256 voxel.
+    #[inline(always)]
     fn escapes(&mut self, from: IVec3, direction: (i32, i32), steps: i32, rise: i32) -> bool {
-        let mut y = from.y * ONE;
         // Most rays of a tunnel end in the ground, wherever they enter it.
-        if y + steps * rise < self.top(along(from, direction, steps)) {
-            return false;
-        }
-        for step in 1..=steps {
+        from.y * ONE + steps * rise >= self.top(along(from, direction, steps))
+            && self.is_free(from, direction, steps, rise)
+    }
+
+    /// Whether no ground lies in the way of a ray, which ends above all ground.
+    fn is_free(&mut self, from: IVec3, direction: (i32, i32), steps: i32, rise: i32) -> bool {
+        let mut y = from.y * ONE;
+        let (mut x, mut z) = (2 * from.x, 2 * from.z);
+        for _ in 0..steps {
             let before = y;
             y += rise;
-            let column = along(from, direction, step);
+            (x, z) = (x + direction.0, z + direction.1);
+            let column = Column::new(x >> 1, z >> 1);
             if y < self.top(column) {
                 // Steep rays pass several points of a column.
-                let (low, high) = (round(before) + 1, round(y));
-                if (low.min(high)..=high).any(|y| self.view().is_solid(column.at(y))) {
+                let high = round(y);
+                let low = high.min(round(before) + 1);
+                if (low..=high).any(|y| self.is_solid(column.at(y))) {
                     return false;
                 }
             }
@@ -345,6 +255,28 @@ pub(crate) trait SkyLights {
 pub(super) fn columns_of(place: IVec3) -> [Column; 2] {
     let cell = Column::new(place.x.div_euclid(SNAP), place.z.div_euclid(SNAP));
     [cell, cell.offset(i32::from(place.x.rem_euclid(SNAP) > 0), i32::from(place.z.rem_euclid(SNAP) > 0))]
+}
+
+/// The side of the cubes at whose corners the light under roofs is computed, in 1/4096 voxel: a power of two.
+const SIDE: i32 = 2 * SNAP;
+
+/// The lowest corner of the cube that holds a place in 1/4096 voxel.
+pub(super) fn first_corner(place: IVec3) -> IVec3 {
+    (place >> SIDE.ilog2()) << 1
+}
+
+/// How far a place lies from there.
+pub(super) fn part_of_cube(place: IVec3) -> IVec3 {
+    place & (SIDE - 1)
+}
+
+/// The corners of its cube that light a place which lies this far from the lowest of them, 0 or 1 along each axis: on a
+/// side of the cube, a place has none of the light of the other side.
+pub(super) fn corners_around(part: IVec3) -> impl Iterator<Item = IVec3> {
+    let [x, y, z] = part.signum().to_array();
+    let all = x | y << 1 | z << 2;
+    let corners = (0..8).filter(move |corner| corner & !all == 0);
+    corners.map(|corner| IVec3::new(corner & 1, corner >> 1 & 1, corner >> 2))
 }
 
 /// Whether the surface at a height is under a roof, given the lower top of its columns, both in 1/256 voxel: what is
@@ -367,7 +299,7 @@ pub(super) fn is_wall(rise: i32, are_changed: [bool; 2]) -> bool {
 /// column in front, from which it is half a column farther away: in three of eight directions.
 fn hidden_by_wall(rise: i32) -> u16 {
     let slope = (rise >> 3).min(255) as i16;
-    3 * (below(2 * slope) - below(slope)) / 8
+    3 * (below(capped(2 * slope)) - below(capped(slope))) / 8
 }
 
 /// The column that a ray from a point reaches with a step, given its direction in half columns.
@@ -375,13 +307,21 @@ fn along(from: IVec3, (dx, dz): (i32, i32), step: i32) -> Column {
     Column::of(from).offset((dx * step) >> 1, (dz * step) >> 1)
 }
 
+/// The column in which the longest ray from a point ends in a direction, given its number.
+pub(super) fn last_of_rays(from: IVec3, number: usize) -> Column {
+    along(from, AROUND[number], LEVEL_RAYS[number % 4].0)
+}
+
 /// The lattice point nearest to a height in 1/256 voxel.
 fn round(y: i32) -> i32 {
     (y + ONE / 2).div_euclid(ONE)
 }
 
+/// In how many directions rays are cast.
+pub(super) const DIRECTION_COUNT: usize = 16;
+
 /// The directions of rays, in half columns: the even ones are straight and diagonal.
-const AROUND: [(i32, i32); 16] = [
+const AROUND: [(i32, i32); DIRECTION_COUNT] = [
     (2, 0),
     (2, 1),
     (2, 2),
@@ -404,7 +344,8 @@ const AROUND: [(i32, i32); 16] = [
 /// directions. Their slopes are 0.45, 1 and 2.24.
 const RAYS: [[(i32, i32); 3]; 2] = [[(13, 114), (9, 256), (5, 572)], [(9, 162), (7, 362), (4, 810)]];
 
-/// Rays of some 14 voxels that rise or fall slightly, with a slope of 0.25 at most, for every fourth direction.
+/// Rays of some 14 voxels that rise or fall slightly, with a slope of 0.25 at most, for every fourth direction: no other
+/// ray in their directions goes farther.
 const LEVEL_RAYS: [(i32, i32); 4] = [(14, 64), (12, 72), (10, 90), (12, 72)];
 
 /// Of the level directions, those in which the open is seen count up to this number: a place with as much light of the

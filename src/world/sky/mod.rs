@@ -18,13 +18,19 @@
 //! | file | what it holds |
 //! | --- | --- |
 //! | `light` | the rules |
+//! | `horizon` | those of horizons, for eight columns at once |
+//! | `air` | what is known of points of air under roofs |
+//! | `bricks` | the bricks near a rectangle of columns |
 //! | `tops` | the highest ground in the columns of a stack of bricks |
 //! | `columns` | all columns of a rectangle: for tiles and chunks |
 //! | `change` | what a commit changes: before and after, compared |
 //! | `sparse` | columns a stride apart: for coarser nodes |
 
+mod air;
+mod bricks;
 mod change;
 mod columns;
+mod horizon;
 mod light;
 mod sparse;
 #[cfg(test)]
@@ -40,9 +46,9 @@ use super::patch::ChangedBrick;
 use super::state::World;
 use crate::ground::Ground;
 use crate::lattice::{BRICK, BrickPos, Column, ONE, SNAP};
-use crate::volume::Brick;
+use crate::volume::{Brick, Layers, layers, pristine_layers};
 
-pub(crate) use change::LightChange;
+pub(crate) use change::{ChangedBox, LightChange};
 pub(crate) use columns::SkyColumns;
 pub(crate) use light::{Light, REACH, SkyLights};
 pub(crate) use sparse::SparseSky;
@@ -59,8 +65,6 @@ struct Newer {
 struct NewerStack {
     /// The heights of its bricks after the commit, ascending.
     rows: Vec<i32>,
-    /// The height of the highest brick that the commit changes.
-    highest: i32,
     /// Its tops before and after the commit: computed when they are first needed.
     tops: OnceLock<[Option<StackTops>; 2]>,
 }
@@ -79,10 +83,8 @@ impl LitWorld {
             let key = pos.stack();
             let stack = newer.stacks.entry(key).or_insert_with(|| NewerStack {
                 rows: world.stacks.get(&key).cloned().unwrap_or_default(),
-                highest: i32::MIN,
                 tops: OnceLock::new(),
             });
-            stack.highest = stack.highest.max(pos.0.y);
             let rows = &mut stack.rows;
             match (rows.binary_search(&pos.0.y), brick.is_some()) {
                 (Err(at), true) => rows.insert(at, pos.0.y),
@@ -109,12 +111,35 @@ impl LitWorld {
         SkyView { world: &self.world, newer: Some(&self.newer), commit: Some(self) }
     }
 
-    /// Where the commit changes bricks: columns of stacks, and where the highest brick of each ends, in 1/256 voxel.
-    pub fn changed_stacks(&self) -> impl Iterator<Item = (Column, i32)> {
-        let stacks = self.newer.stacks.iter();
-        stacks.map(|(&(x, z), stack)| {
-            (Column::new(x * BRICK, z * BRICK), (stack.highest + 1).saturating_mul(BRICK * ONE))
-        })
+    /// The stacks in which the commit changes bricks, in no order.
+    fn changed_stacks(&self) -> impl Iterator<Item = (i32, i32)> {
+        self.newer.stacks.keys().copied()
+    }
+
+    /// What the commit changes of all that light depends on, a box for each stack, in no order.
+    pub fn changes(&self) -> Vec<ChangedBox> {
+        let mut solid: FxHashMap<(i32, i32), ChangedBox> = FxHashMap::default();
+        for &pos in self.newer.bricks.keys() {
+            let [before, after] = [self.view_before(), self.view()].map(|view| view.solid_layers(pos));
+            let own = solid.entry(pos.stack()).or_insert(ChangedBox::NONE);
+            for (y, (before, after)) in (pos.origin().y..).zip(before.iter().zip(&after)) {
+                own.add(pos.stack(), before ^ after, (y * ONE, (y + 1) * ONE));
+            }
+        }
+        for (&stack, own) in &mut solid {
+            let Some(tops) = self.changed_tops(stack) else { continue };
+            let ground = || self.world.ground.heights::<8>(Column::new(stack.0 * BRICK, stack.1 * BRICK));
+            let [before, after] = tops.each_ref().map(|known| match known {
+                Some(known) => known.tops,
+                None => ground().as_flattened().try_into().unwrap_or([0; 64]),
+            });
+            for (bit, (&before, &after)) in before.iter().zip(&after).enumerate() {
+                if before != after {
+                    own.add(stack, 1 << bit, (before.min(after), before.max(after)));
+                }
+            }
+        }
+        solid.into_values().filter(|own| !own.is_empty()).collect()
     }
 
     /// The tops of a stack that the commit changes, before and after; `None` if it does not change the stack.
@@ -150,6 +175,11 @@ impl<'a> SkyView<'a> {
             Some(brick) => brick.as_deref(),
             None => self.world.bricks.get(&pos).map(Arc::as_ref),
         }
+    }
+
+    /// The solid samples where a brick is or could be.
+    fn solid_layers(self, pos: BrickPos) -> Layers {
+        self.brick(pos).map_or_else(|| pristine_layers(self.ground(), pos), |brick| *brick.solid())
     }
 
     /// The heights of the bricks in a stack, ascending.
@@ -196,10 +226,7 @@ impl<'a> SkyView<'a> {
     fn is_solid(self, point: IVec3) -> bool {
         let point = self.clamped(Column::of(point)).at(point.y);
         match self.brick(BrickPos::of(point)) {
-            Some(brick) => {
-                let at = point & 7;
-                brick.solid()[at.y as usize] >> (at.z * 8 + at.x) & 1 == 1
-            }
+            Some(brick) => layers::contains(brick.solid(), BrickPos::index(point)),
             None => self.ground().height(Column::of(point)) > point.y * ONE,
         }
     }

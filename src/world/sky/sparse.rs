@@ -4,7 +4,9 @@ use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use super::SkyView;
-use super::light::{AirLight, FAR, REACH, SkyLights, Step, below, light_of, slope};
+use super::air::AirMemory;
+use super::horizon::{FAR, Step, below, capped, light_of, slope};
+use super::light::{AirLight, REACH, SkyLights};
 use super::tops::StackTops;
 use crate::lattice::Column;
 
@@ -14,14 +16,14 @@ pub(crate) struct SparseSky<'a> {
     stacks: FxHashMap<(i32, i32), Option<Box<StackTops>>>,
     heights: FxHashMap<Column, i32>,
     lights: FxHashMap<Column, u8>,
-    known: FxHashMap<IVec3, Option<AirLight>>,
+    known: AirMemory<Option<AirLight>>,
 }
 
 impl<'a> SparseSky<'a> {
     /// Nothing is known yet.
     pub fn new(view: SkyView<'a>) -> Self {
         let (stacks, heights) = (FxHashMap::default(), FxHashMap::default());
-        Self { view, stacks, heights, lights: FxHashMap::default(), known: FxHashMap::default() }
+        Self { view, stacks, heights, lights: FxHashMap::default(), known: AirMemory::new(4) }
     }
 
     /// Finds the light on the tops of a grid of columns a stride apart together, but for those near edits.
@@ -39,7 +41,7 @@ impl<'a> SparseSky<'a> {
                     *horizon = (*horizon).max(slope(top, y, factor));
                 }
             }
-            hidden.iter_mut().zip(horizons).for_each(|(sum, horizon)| *sum += below(horizon));
+            hidden.iter_mut().zip(horizons).for_each(|(sum, horizon)| *sum += below(capped(horizon)));
         }
         let mut is_near = vec![false; own.len()];
         let stack = |column: Column| (column.x >> 3, column.z >> 3);
@@ -103,7 +105,7 @@ impl SkyLights for SparseSky<'_> {
         light
     }
 
-    fn known(&mut self) -> &mut FxHashMap<IVec3, Option<AirLight>> {
+    fn known(&mut self) -> &mut AirMemory<Option<AirLight>> {
         &mut self.known
     }
 }

@@ -1,56 +1,20 @@
 //! The light of a rectangle of columns, computed together.
 
+mod horizons;
+mod run;
+
 use std::cell::OnceCell;
-use std::ops::Range;
 
 use glam::IVec3;
-use rustc_hash::FxHashMap;
 
-use super::light::{
-    AirLight, FAR, HIGHEST_RISE, Light, NEAR, REACH, SkyLights, Step, below, hide, light_of, raise,
-    raise_where, slope,
-};
+use self::horizons::{Ahead, LowTops};
+pub(super) use self::run::Run;
+use super::air::AirMemory;
+use super::bricks::NearBricks;
+use super::light::{AirLight, HIGHEST_RISE, Light, REACH, SkyLights};
 use super::{LitWorld, SkyView};
-use crate::lattice::{Column, ONE, SNAP};
-
-/// Columns of a row next to each other: the first, and where they end. Empty if they end before they begin.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Run {
-    pub start: i32,
-    pub end: i32,
-}
-
-impl Run {
-    pub const EMPTY: Self = Self { start: i32::MAX, end: i32::MIN };
-
-    pub fn is_empty(self) -> bool {
-        self.start >= self.end
-    }
-
-    /// The shortest run that holds both.
-    pub fn hull(self, other: Self) -> Self {
-        if other.is_empty() {
-            return self;
-        }
-        if self.is_empty() {
-            return other;
-        }
-        Self { start: self.start.min(other.start), end: self.end.max(other.end) }
-    }
-
-    pub fn moved(self, by: i32) -> Self {
-        if self.is_empty() {
-            return Self::EMPTY;
-        }
-        Self { start: self.start + by, end: self.end + by }
-    }
-
-    /// Those of its columns that an array of this length holds.
-    pub fn within(self, length: usize) -> Range<usize> {
-        let [start, end] = [self.start, self.end].map(|at| at.clamp(0, length as i32) as usize);
-        start..end.max(start)
-    }
-}
+use crate::lattice::{BrickPos, Column, ONE, SNAP};
+use crate::volume::layers;
 
 /// The columns of a rectangle and those around it that its light depends on.
 pub(crate) struct SkyColumns<'a> {
@@ -61,17 +25,22 @@ pub(crate) struct SkyColumns<'a> {
     /// The first of all columns, those around included, and how many there are along x.
     first: Column,
     width: usize,
+    ahead: Ahead,
     /// In 1/256 voxel, x fastest; eight more follow after the last row.
     tops: Vec<i32>,
     /// -1 for columns whose top is not the ground's own height, others 0. Empty if there are none.
     changed: Vec<i16>,
     /// For each row of all columns, those between which such columns lie. Empty if there are none.
     runs: Vec<Run>,
+    /// Their tops once more, if they lie within 256 voxels: computed when they are first needed.
+    low_tops: OnceCell<Option<LowTops>>,
     lowest: OnceCell<i32>,
     /// On the tops of the rectangle's columns, for those rows for which it was asked.
     lights: Vec<u8>,
     is_lit: Vec<bool>,
-    known: FxHashMap<IVec3, Option<AirLight>>,
+    known: AirMemory<Option<AirLight>>,
+    /// Looked up when light under a roof is first asked for.
+    bricks: Option<NearBricks<'a>>,
 }
 
 impl<'a> SkyColumns<'a> {
@@ -83,25 +52,28 @@ impl<'a> SkyColumns<'a> {
         let size = [high.x - low.x + 1, high.z - low.z + 1].map(|count| count.max(1) as usize);
         // Room for eight columns from any of the last row on.
         let mut tops = vec![0; width * depth + 8];
-        view.ground().fill_heights(first, width, &mut tops[..width * depth]);
+        let (own, room) = tops.split_at_mut(width * depth);
+        view.ground().fill_heights(first, width, own);
+        room.fill(own[0]);
         let mut all = Self {
             view,
             low,
             size,
             first,
             width,
+            ahead: Ahead::new(width),
             tops,
             changed: Vec::new(),
             runs: Vec::new(),
+            low_tops: OnceCell::new(),
             lowest: OnceCell::new(),
             lights: Vec::new(),
             is_lit: vec![false; size[1]],
-            known: FxHashMap::default(),
+            known: AirMemory::new(5),
+            bricks: None,
         };
-        for z in first.z >> 3..=last.z >> 3 {
-            for x in first.x >> 3..=last.x >> 3 {
-                view.with_tops((x, z), |own| all.fill((x, z), &own.tops, own.changed));
-            }
+        for at in view.stacks_within((first.x >> 3, first.z >> 3), (last.x >> 3, last.z >> 3)) {
+            view.with_tops(at, |own| all.fill(at, &own.tops, own.changed));
         }
         all.repeat_rim();
         all
@@ -115,20 +87,23 @@ impl<'a> SkyColumns<'a> {
             tops: self.tops.clone(),
             changed: self.changed.clone(),
             runs: self.runs.clone(),
+            low_tops: OnceCell::new(),
             lowest: OnceCell::new(),
             lights: Vec::new(),
             is_lit: vec![false; self.size[1]],
-            known: FxHashMap::default(),
+            known: AirMemory::new(5),
+            bricks: None,
             ..*self
         };
         let last = all.last();
-        for (stack, _) in lit.changed_stacks() {
+        for at in lit.changed_stacks() {
+            let stack = Column::new(at.0 << 3, at.1 << 3);
             let is_near = |at: i32, first: i32, last: i32| first - 8 < at && at <= last;
-            if is_near(stack.x, all.first.x, last.x) && is_near(stack.z, all.first.z, last.z) {
-                let at = (stack.x >> 3, stack.z >> 3);
-                if view.with_tops(at, |own| all.fill(at, &own.tops, own.changed)).is_none() {
-                    all.fill(at, view.ground().heights::<8>(stack).as_flattened(), 0);
-                }
+            if !is_near(stack.x, all.first.x, last.x) || !is_near(stack.z, all.first.z, last.z) {
+                continue;
+            }
+            if view.with_tops(at, |own| all.fill(at, &own.tops, own.changed)).is_none() {
+                all.fill(at, view.ground().heights::<8>(stack).as_flattened(), 0);
             }
         }
         all.repeat_rim();
@@ -164,11 +139,18 @@ impl<'a> SkyColumns<'a> {
             let own = (z * 8 + from) as usize..(z * 8 + to + 1) as usize;
             self.tops[place..][..own.len()].copy_from_slice(&tops[own.clone()]);
             if !self.changed.is_empty() {
-                let flags = self.changed[place..][..own.len()].iter_mut();
-                flags.zip(own).for_each(|(flag, bit)| *flag = -((changed >> bit & 1) as i16));
-                if changed >> (z * 8) & 0xff != 0 {
-                    let run = Run { start, end: start + to - from + 1 };
-                    self.runs[row] = self.runs[row].hull(run);
+                let flags = &mut self.changed[place..][..own.len()];
+                let bits = (changed >> (z * 8)) as u8;
+                if bits == 0 {
+                    flags.fill(0);
+                } else {
+                    flags.iter_mut().zip(own).for_each(|(flag, bit)| *flag = -((changed >> bit & 1) as i16));
+                    let [before, after] =
+                        [bits.trailing_zeros(), bits.leading_zeros()].map(|count| count as i32);
+                    let run = Run { start: before.max(from), end: (8 - after).min(to + 1) };
+                    if !run.is_empty() {
+                        self.runs[row] = self.runs[row].hull(run.moved(at.x - first.x));
+                    }
                 }
             }
         }
@@ -210,6 +192,14 @@ impl<'a> SkyColumns<'a> {
         repeat(&mut self.runs, 1, (0, low.1), (0, high.1));
     }
 
+    /// Whether a place under a roof lies so deep that no ray from there gets out.
+    pub(super) fn is_dark(&self, place: IVec3) -> bool {
+        let highest = place.y.div_euclid(SNAP / ONE) + HIGHEST_RISE;
+        let find = || self.tops.iter().fold(i32::MAX, |lowest, &top| lowest.min(top));
+        // Mostly, the first column will do.
+        highest < self.tops[0] && highest < *self.lowest.get_or_init(find)
+    }
+
     fn index(&self, column: Column) -> usize {
         (column.z - self.first.z) as usize * self.width + (column.x - self.first.x) as usize
     }
@@ -245,54 +235,6 @@ impl<'a> SkyColumns<'a> {
         (z + REACH as usize) * self.width + x + REACH as usize
     }
 
-    /// The horizons of eight columns of a row of the rectangle in a direction; some of them may lie beyond it.
-    #[inline]
-    pub(super) fn horizons(&self, [x, z]: [usize; 2], direction: usize, is_near: bool) -> [i16; 8] {
-        let mut horizons = [0; 8];
-        let own = self.inner_index([x, z]);
-        let at =
-            |step: &Step| own.wrapping_add_signed(step.dz as isize * self.width as isize + step.dx as isize);
-        let Some(ys) = eight(&self.tops, own) else { return horizons };
-        for step in &FAR[direction] {
-            if let Some(tops) = eight(&self.tops, at(step)) {
-                raise(&mut horizons, tops, ys, step);
-            }
-        }
-        if !is_near {
-            return horizons;
-        }
-        let Some(own_flags) = eight(&self.changed, own) else { return horizons };
-        let row = z as i32 + REACH;
-        let start = x as i32 + REACH;
-        let holds_any = |row: i32, start: i32| {
-            let run = self.runs[row as usize];
-            run.start < start + 8 && run.end > start
-        };
-        let is_own = holds_any(row, start);
-        for step in &NEAR[direction] {
-            if !is_own && !holds_any(row + step.dz, start + step.dx) {
-                continue;
-            }
-            let at = at(step);
-            if let (Some(tops), Some(flags)) = (eight(&self.tops, at), eight(&self.changed, at)) {
-                raise_where([flags, own_flags], &mut horizons, tops, ys, step);
-            }
-        }
-        horizons
-    }
-
-    /// Columns of a row of the rectangle, counted from its first, that may see changed tops near them, or are changed.
-    pub(super) fn near_run(&self, z: usize) -> Run {
-        let row = z + REACH as usize;
-        let by = NEAR_REACH as usize;
-        let rows = self.runs.get(row - by..=row + by).unwrap_or_default();
-        let all = rows.iter().copied().fold(Run::EMPTY, Run::hull);
-        if all.is_empty() {
-            return all;
-        }
-        Run { start: all.start - REACH - NEAR_REACH, end: all.end - REACH + NEAR_REACH }
-    }
-
     /// Columns of a row of the rectangle, counted from its first, between which those lie whose top is not the ground's
     /// own height.
     pub(super) fn changed_run(&self, z: usize) -> Run {
@@ -305,52 +247,26 @@ impl<'a> SkyColumns<'a> {
         &self.lights
     }
 
-    /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices.
+    /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices. Where that
+    /// was dug, it is the light on the ground below.
     pub fn ground_lights(&mut self) -> Vec<Light> {
         let mut lights: Vec<Light> = self.lights().iter().map(|&sky| Light::open(sky)).collect();
         let width = self.size[0];
         for z in 0..self.size[1] {
             for x in self.changed_run(z).within(width) {
                 let column = self.low.offset(x as i32, z as i32);
-                if self.is_changed(column) {
-                    let height = self.view.ground().height(column) * (SNAP / ONE);
-                    lights[z * width + x] = self.light((column.at(0) * SNAP).with_y(height));
+                if !self.is_changed(column) {
+                    continue;
+                }
+                let height = self.view.ground().height(column);
+                // No triangle uses the vertices of ground that was dug.
+                if self.top(column) >= height {
+                    lights[z * width + x] = self.light((column.at(0) * SNAP).with_y(height * (SNAP / ONE)));
                 }
             }
         }
         lights
     }
-
-    /// Lights a row of the rectangle, unless it is lit.
-    fn light_row(&mut self, z: usize) {
-        if self.is_lit[z] {
-            return;
-        }
-        self.is_lit[z] = true;
-        let width = self.size[0];
-        let mut row = std::mem::take(&mut self.lights);
-        row.resize(width * self.size[1], 0);
-        let near = self.near_run(z).within(width);
-        for (block, lights) in row[z * width..][..width].chunks_mut(8).enumerate() {
-            let x = block * 8;
-            let is_near = near.start < x + 8 && near.end > x;
-            let mut hidden = [0; 8];
-            for direction in 0..8 {
-                hide(&mut hidden, &self.horizons([x, z], direction, is_near));
-            }
-            lights.iter_mut().zip(hidden).for_each(|(light, hidden)| *light = light_of(hidden));
-        }
-        self.lights = row;
-    }
-}
-
-/// The furthest of the steps at which only changed columns count.
-const NEAR_REACH: i32 = 11;
-
-/// Eight columns next to each other.
-#[inline(always)]
-fn eight<T>(all: &[T], at: usize) -> Option<&[T; 8]> {
-    all.get(at..)?.first_chunk()
 }
 
 impl SkyLights for SkyColumns<'_> {
@@ -366,6 +282,23 @@ impl SkyLights for SkyColumns<'_> {
         !self.changed.is_empty() && self.changed[self.index(column)] != 0
     }
 
+    #[inline(always)]
+    fn is_solid(&mut self, point: IVec3) -> bool {
+        let column = self.view.clamped(Column::of(point));
+        let point = column.at(point.y);
+        let bricks = match &mut self.bricks {
+            Some(bricks) => bricks,
+            None => {
+                let [low, high] = [self.first, self.last()].map(|column| (column.x >> 3, column.z >> 3));
+                self.bricks.insert(NearBricks::new(self.view, low, high))
+            }
+        };
+        match bricks.get(BrickPos::of(point)) {
+            Some(brick) => layers::contains(brick.solid(), BrickPos::index(point)),
+            None => self.undug_height(column) > point.y * ONE,
+        }
+    }
+
     fn top_light(&mut self, column: Column) -> u8 {
         if let Some([x, z]) = self.place(column) {
             self.light_row(z);
@@ -376,32 +309,22 @@ impl SkyLights for SkyColumns<'_> {
     }
 
     fn open_light(&mut self, column: Column, y: i32) -> u8 {
-        let (own, width) = (self.index(column), self.width as isize);
-        let at = |step: &Step| own.wrapping_add_signed(step.dz as isize * width + step.dx as isize);
-        let is_changed = |at: usize| self.changed.get(at).is_some_and(|&flag| flag != 0);
-        let is_own = is_changed(own);
-        let mut hidden = 0;
-        for (far, near) in FAR.iter().zip(&NEAR) {
-            let tops = far.iter().map(|step| slope(self.tops[at(step)], y, step.factor));
-            let mut horizon = tops.fold(0, i16::max);
-            if !self.changed.is_empty() {
-                for step in near.iter().filter(|step| is_own || is_changed(at(step))) {
-                    horizon = horizon.max(slope(self.tops[at(step)], y, step.factor));
-                }
+        let own = self.index(column);
+        match self.low_tops() {
+            Some(low) => {
+                let y = (y - low.base).clamp(0, u16::MAX.into()) as u16;
+                self.open_light_of(&low.tops, own, y)
             }
-            hidden += below(horizon);
+            None => self.open_light_of(&self.tops, own, y),
         }
-        light_of(hidden)
     }
 
-    fn known(&mut self) -> &mut FxHashMap<IVec3, Option<AirLight>> {
+    fn known(&mut self) -> &mut AirMemory<Option<AirLight>> {
         &mut self.known
     }
 
     fn covered_light(&mut self, place: IVec3, columns: [Column; 2]) -> Light {
-        let tops = || self.tops[..self.row_count() * self.width].iter();
-        let lowest = *self.lowest.get_or_init(|| tops().copied().min().unwrap_or_default());
-        if place.y.div_euclid(SNAP / ONE) + HIGHEST_RISE < lowest {
+        if self.is_dark(place) {
             return Light::NONE;
         }
         self.covered_light_by_rays(place, columns)
