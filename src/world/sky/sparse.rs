@@ -1,6 +1,5 @@
 //! The light of columns that lie apart, or of a few places.
 
-use glam::IVec3;
 use rustc_hash::FxHashMap;
 
 use super::SkyView;
