@@ -35,11 +35,11 @@ fn some(rng: &mut Rng, images: &[Arc<GreyImage>]) -> ContentTable {
 }
 
 fn brush(rng: &mut Rng, ground: &Ground, images: &[Arc<GreyImage>]) -> Brush {
-    let (x, z) = (40 + rng.i32(..24), 40 + rng.i32(..24));
+    let (x, z) = (rng.i32(40..64), rng.i32(40..64));
     let at = Vec3::new(x as f32, ground.height(Column::new(x, z)) as f32 / 256.0, z as f32);
     let prefabs = &contents().1;
     let paste = Paste::new(Arc::clone(&prefabs[rng.usize(..prefabs.len())]), at.round());
-    let paste = paste.turned_about_y(rng.i32(..4));
+    let paste = paste.turned_about_y(rng.i32(0..4));
     match rng.u8(..8) {
         0 => Brush::paste(paste),
         1 => Brush::paste(paste.edited_only().mirrored()),
