@@ -161,7 +161,11 @@ fn keys(
         actions.write(PanelAction::SavePicture);
     }
     if keys.just_pressed(KeyCode::Escape) {
-        let is_placed = tool.placed.is_some();
+        let has_path = !tool.points.is_empty() && tool.fitting_shape() == ToolShape::Path;
+        if has_path {
+            tool.points.clear();
+        }
+        let is_placed = tool.placed.is_some() || has_path;
         actions.write(if is_placed { PanelAction::ReleaseBrush } else { PanelAction::Quit });
     }
     if keys.just_pressed(KeyCode::KeyG) {
@@ -188,12 +192,18 @@ fn command(
     mut presses: MessageReader<KeyboardInput>,
     keys: Res<ButtonInput<KeyCode>>,
     panel: Option<Res<PanelInput>>,
+    mut tool: ResMut<BrushTool>,
     mut actions: MessageWriter<PanelAction>,
 ) {
     let is_shift = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
     let is_due = keyboard_is_free(panel) && keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
     for press in presses.read().filter(|press| is_due && press.state.is_pressed() && !press.repeat) {
         let action = match letter(press) {
+            // The last point of a path was set after all edits.
+            Some('z') if !is_shift && tool.fitting_shape() == ToolShape::Path && !tool.points.is_empty() => {
+                tool.points.pop();
+                continue;
+            }
             Some('z') if !is_shift => PanelAction::Undo,
             Some('z' | 'y') => PanelAction::Redo,
             Some('s') if is_shift => PanelAction::SaveLevelAs,
@@ -226,8 +236,9 @@ fn copy(
     let Ok((terrain, place)) = terrains.get(hit.terrain) else { return };
     let copied = tool.copy(terrain, place, &hit).map_err(|why| why.to_string());
     let is_kept = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
-    panel
-        .report(copied.and_then(|()| if is_kept { stamps::keep(&tool.prefab) } else { Ok("Copied".into()) }));
+    let keep = || stamps::keep(&tool.prefab, &panel.pictures);
+    let copied = copied.and_then(|()| if is_kept { keep() } else { Ok("Copied".into()) });
+    panel.report(copied);
 }
 
 /// The letter on a key, by the keyboard layout: QWERTZ and AZERTY have Z elsewhere than QWERTY. For layouts without

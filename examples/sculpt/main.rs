@@ -16,9 +16,9 @@
 //! | `F` | flies to what is under the mouse |
 //! | wheel, `[`, `]` | size of the brush |
 //! | `1` to `9`, `0`, `-`, `=`, `P`, `R`, `X`, `U`, `V`, or `Tab` | operations |
-//! | click, `Enter`, `Backspace` with the shape *Path* | sets a point, makes one edit of all points, takes the last one back |
+//! | click, `Enter`, `Backspace` with the shape *Path* | sets a point, makes one edit of all points, takes the last one back, as `Ctrl+Z` does; `Esc` drops all |
 //! | `G`, `Enter`, `End`, `Esc` | places the brush, with handles to move, turn and scale it; applies it; moves it to the ground; takes it back |
-//! | `Ctrl+C`, `Ctrl+Shift+C` | copies what lies in the brush, to paste it; writes it to a `.prefab` file too |
+//! | `Ctrl+C`, `Ctrl+Shift+C` | copies what lies in the brush, to paste it; writes it to a `.prefab` file in the folder of pictures too |
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
 //! | `Ctrl+N`, `Ctrl+O`, `Ctrl+S`, `Ctrl+Shift+S` | new, open, save, save as |
 //! | `H` | takes the height under the mouse for levelling |

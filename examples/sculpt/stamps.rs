@@ -104,14 +104,15 @@ fn take_prefab(file: &Path, tool: &mut BrushTool) -> Result<String, String> {
     Ok(format!("{} is pasted now", file.display()))
 }
 
-/// Writes what was copied to the first free file of the working folder.
-pub fn keep(copy: &ToolPrefab) -> Result<String, String> {
+/// Writes what was copied to the first free file of a folder.
+pub fn keep(copy: &ToolPrefab, folder: &Path) -> Result<String, String> {
     let Some(prefab) = &copy.prefab else { return Err("Nothing was copied".into()) };
-    let free = |number: &u32| !Path::new(&format!("copy_{number}.{PREFAB}")).exists();
-    let name = format!("copy_{}.{PREFAB}", (1..10_000).find(free).unwrap_or_default());
-    std::fs::write(&name, write_prefab(prefab))
-        .map_err(|why| format!("The copy could not be saved in {name}: {why}"))?;
-    Ok(format!("Copied, and saved to {name}"))
+    let file = |number: u32| folder.join(format!("copy_{number}.{PREFAB}"));
+    let file = file((1..10_000).find(|number| !file(*number).exists()).unwrap_or_default());
+    std::fs::create_dir_all(folder)
+        .and_then(|()| std::fs::write(&file, write_prefab(prefab)))
+        .map_err(|why| format!("The copy could not be saved in {}: {why}", file.display()))?;
+    Ok(format!("Copied, and saved to {}", file.display()))
 }
 
 fn read(file: &Path) -> Result<StampImage, StampError> {

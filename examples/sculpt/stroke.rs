@@ -104,7 +104,8 @@ pub fn aim(
     let cursor = window.cursor_position().filter(|_| pointer_is_free(input));
     let ray = cursor.and_then(|cursor| camera.viewport_to_world(place, cursor).ok());
     aim.0 = ray.and_then(|ray| terrains.raycast(ray, REACH));
-    let pointer = aim.0.map(|hit| hit.position).or(panel.pointer);
+    let is_in_view = cursor.is_some();
+    let pointer = aim.0.map(|hit| hit.position).or(panel.pointer.filter(|_| !is_in_view));
     if panel.pointer != pointer {
         panel.pointer = pointer;
     }

@@ -5,9 +5,9 @@ use bevy_egui::egui::{self, Id, Modal, RichText, TextEdit, Ui};
 
 use super::open_level::{Answer, Files, Question};
 use super::state::{BurrowPanel, Note, PanelAction};
-use super::theme::{self, ACCENT, BRIGHT, FAINT};
+use super::theme::{self, ACCENT, BAD, BRIGHT, FAINT};
 use super::widgets::{button, key_button, note, share};
-use super::{level, survey, texts};
+use super::{level, survey, texts, widgets};
 use crate::terrain::Terrain;
 
 /// Notes which terrains have changes that are not saved.
@@ -34,8 +34,14 @@ pub(super) fn answer(
     let chosen = survey::chosen(&panel, &terrains).and_then(|entity| terrains.get(entity).ok());
     match (question, answer) {
         (Some(Question::Unsaved(action)), Some(Answer::Discard)) => {
-            files.may_lose = Some(action);
+            (files.may_lose, files.then) = (Some(action), None);
             actions.write(action);
+        }
+        // A new level would be saved over the one that is to be opened.
+        (Some(Question::Unsaved(PanelAction::LoadLevel)), Some(Answer::Yes))
+            if files.opened().is_none() && panel.level.exists() =>
+        {
+            panel.report(Err(texts::SAVE_ELSEWHERE.into()));
         }
         (Some(Question::Unsaved(action)), Some(Answer::Yes)) => {
             files.then = Some(action);
@@ -105,4 +111,26 @@ pub(super) fn ask(context: &egui::Context, files: &mut Files) {
             }
         }
     });
+}
+
+/// Shows a failure or running work at the top, for when the column that has the message is not in sight. Returns whether
+/// it was clicked away.
+pub(super) fn alert(context: &egui::Context, note: Option<&Note>) -> bool {
+    let (color, text) = match note {
+        Some(Note::Bad(text)) => (BAD, text),
+        Some(Note::Busy(text)) => (FAINT, text),
+        _ => return false,
+    };
+    let area = egui::Area::new(Id::new("burrow message")).order(egui::Order::Foreground);
+    let shown = area.anchor(egui::Align2::CENTER_TOP, [0.0, theme::GAP]).show(context, |ui| {
+        ui.set_style(theme::style());
+        theme::card().fill(theme::NIGHT).show(ui, |ui| {
+            ui.set_max_width(320.0);
+            let text = egui::Label::new(RichText::new(text).color(color).size(12.0));
+            let label = ui.add(text.sense(egui::Sense::click()));
+            widgets::note(ui, texts::MESSAGE, label.rect);
+            label.clicked()
+        })
+    });
+    shown.inner.inner
 }

@@ -18,7 +18,7 @@ pub(super) enum LevelTask {
     /// The state that is saved, and where.
     Save(ThreadTask<Result<(), StoreError>>, PathBuf, Entity, LevelState),
     /// The terrain whose place the level takes, and where it is from.
-    Load(ThreadTask<Result<Terrain, StoreError>>, Entity, PathBuf),
+    Load(ThreadTask<Result<Terrain, String>>, Entity, PathBuf),
     New(ThreadTask<Result<Terrain, TerrainError>>, Entity),
 }
 
@@ -66,7 +66,13 @@ pub(super) fn load(
     if !begin(panel, files, texts::OPENING) {
         return;
     }
-    let load = move || Ok(load_level(&path, &ground)?.terrain(ground)?);
+    let load = move || {
+        let level = load_level(&path, &ground).map_err(|why| why.to_string())?;
+        if level.ground != ground.hash() {
+            return Err(texts::OTHER_GROUND.to_owned());
+        }
+        level.terrain(ground).map_err(|why| why.to_string())
+    };
     commands.insert_resource(LevelTask::Load(ThreadTask::start(Threads::Background, load), entity, folder));
 }
 
@@ -112,7 +118,7 @@ pub(super) fn finish(
         }
         LevelTask::Load(task, entity, folder) => {
             let Some(outcome) = task.finish() else { return };
-            outcome.map_err(|why| why.to_string()).map(|terrain| {
+            outcome.map(|terrain| {
                 commands.entity(*entity).try_insert(terrain);
                 files.note_opened(*entity, Some(folder.clone()));
                 texts::opened(folder.display())

@@ -162,9 +162,17 @@ fn perform_actions(
                     PanelAction::SaveLevel => files.target(&panel),
                     _ => panel.level.clone(),
                 };
+                if target.as_os_str().is_empty() {
+                    files.forget_next();
+                    panel.report(Err(texts::NO_FOLDER.into()));
+                    continue;
+                }
                 terrain.into_iter().for_each(|own| {
                     level::save(&mut commands, (&mut *panel, &mut *files), own, target.clone())
                 });
+            }
+            Some(PanelAction::LoadLevel) if panel.level.as_os_str().is_empty() => {
+                panel.report(Err(texts::NO_FOLDER.into()));
             }
             Some(PanelAction::LoadLevel) => {
                 terrain
@@ -251,6 +259,9 @@ fn draw(
     let Ok(context) = contexts.ctx_mut() else { return };
     // A question is asked even while the panel is closed.
     files::ask(context, files.bypass_change_detection());
+    if show_elsewhere(context, &panel) {
+        panel.note = None;
+    }
     if !panel.is_open {
         places.set_if_neq(widgets::places(context));
         return;
@@ -330,6 +341,13 @@ fn draw(
         new_controls.apply(&controls, entity, &mut commands);
     }
     actions.write_batch(pressed);
+}
+
+/// Shows a failure or running work where the column that has the message is not in sight; returns whether it was clicked
+/// away.
+fn show_elsewhere(context: &egui::Context, panel: &BurrowPanel) -> bool {
+    let is_seen = panel.is_open && panel.shows_world && is_unfolded(context, WORLD);
+    !is_seen && files::alert(context, panel.note.as_ref())
 }
 
 /// The voxel size of the chosen terrain.

@@ -71,7 +71,9 @@ pub(super) enum Question {
 impl Question {
     pub fn text(&self) -> String {
         match self {
-            Self::Unsaved(_) => texts::UNSAVED_QUESTION.into(),
+            Self::Unsaved(PanelAction::Quit) => texts::UNSAVED_QUIT.into(),
+            Self::Unsaved(PanelAction::LoadLevel) => texts::UNSAVED_OPEN.into(),
+            Self::Unsaved(_) => texts::UNSAVED_NEW.into(),
             Self::Replace(path) => texts::replace(path.display()),
         }
     }
@@ -167,9 +169,12 @@ impl Files {
             _ => false,
         };
         let may_lose = self.may_lose.take_if(|own| *own == action).is_some();
-        if matches!(action, PanelAction::Quit | PanelAction::ReleaseBrush) && self.question.is_some() {
-            // The key that asks also takes the question back; while a brush is placed, games may use it to release that.
-            self.question = None;
+        if self.question.is_some() {
+            // Until it is answered, nothing else is done. The key that asks also takes the question back; while a brush is
+            // placed, games may use it to release that.
+            if matches!(action, PanelAction::Quit | PanelAction::ReleaseBrush) {
+                (self.question, self.then) = (None, None);
+            }
             return None;
         }
         if loses && !may_lose {

@@ -161,9 +161,13 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
 /// is touched, and [`read_level_files`] reads new files that have not replaced the old ones yet.
 ///
 /// # Errors
-/// When a file can't be written.
+/// When a file can't be written, or the folder has no name.
 pub fn save_level(folder: impl AsRef<Path>, level: &Level) -> Result<(), StoreError> {
     let folder = folder.as_ref();
+    if folder.as_os_str().is_empty() {
+        let why = io::Error::new(io::ErrorKind::InvalidInput, "the folder has no name");
+        return Err(StoreError::files("creating the level's folder")(why));
+    }
     let files = level::write_level(level)?;
     fs::create_dir_all(folder).map_err(StoreError::files("creating the level's folder"))?;
     Pending::finish(folder)?;

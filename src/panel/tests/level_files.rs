@@ -155,3 +155,75 @@ fn a_second_action_waits_for_the_first_and_loses_nothing_of_it() {
     assert_eq!(hash(&app, terrain), saved);
     std::fs::remove_dir_all(folder).expect("removed");
 }
+
+#[test]
+fn a_question_that_is_taken_back_takes_what_would_follow_with_it() {
+    let (mut app, terrain, folder) = editor("taken_back");
+    let other = folder.with_extension("other");
+    std::fs::create_dir_all(&folder).expect("a folder");
+    dig_at(&mut app, terrain, 20.0);
+    assert!(act(&mut app, PanelAction::Quit, Some(texts::SAVE_CHANGES)));
+    assert!(app.world().resource::<Files>().is_asking(), "whether the folder's content is replaced");
+    act(&mut app, PanelAction::Quit, None);
+    assert!(!app.world().resource::<Files>().is_asking());
+    app.world_mut().resource_mut::<BurrowPanel>().level = other.clone();
+    assert!(!act(&mut app, PanelAction::SaveLevel, None));
+    assert!(other.exists() && app.world().resource::<Exits>().0 == 0, "it is saved, and nothing more");
+    std::fs::remove_dir_all(folder).expect("removed");
+    std::fs::remove_dir_all(other).expect("removed");
+}
+
+#[test]
+fn nothing_is_done_behind_a_question() {
+    let (mut app, terrain, folder) = editor("behind");
+    let changed = dig_at(&mut app, terrain, 20.0);
+    assert!(act(&mut app, PanelAction::LoadLevel, None));
+    let asked = app.world().resource::<Files>().question.clone();
+    for action in [PanelAction::Undo, PanelAction::NewLevel, PanelAction::SaveLevel, PanelAction::PlaceBrush]
+    {
+        assert!(act(&mut app, action, None), "{action:?}");
+        assert_eq!(app.world().resource::<Files>().question, asked, "{action:?}");
+    }
+    assert_eq!(hash(&app, terrain), changed);
+    assert!(app.world().resource::<Messages<Undo>>().is_empty() && !folder.exists());
+}
+
+#[test]
+fn changes_are_not_saved_over_the_level_that_is_to_be_opened() {
+    let (mut app, terrain, folder) = editor("over");
+    let saved = dig_at(&mut app, terrain, 20.0);
+    act(&mut app, PanelAction::SaveLevel, None);
+    act(&mut app, PanelAction::NewLevel, None);
+    let changed = dig_at(&mut app, terrain, 40.0);
+    assert!(act(&mut app, PanelAction::LoadLevel, Some(texts::SAVE_CHANGES)));
+    let note = app.world().resource::<BurrowPanel>().note.clone();
+    assert_eq!(note, Some(Note::Bad(texts::SAVE_ELSEWHERE.into())));
+    assert_eq!((hash(&app, terrain), app.world().resource::<Files>().is_asking()), (changed, false));
+    assert!(act(&mut app, PanelAction::LoadLevel, Some(texts::DISCARD)));
+    assert_eq!(hash(&app, terrain), saved);
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn levels_without_a_folder_and_of_another_ground_are_refused_in_a_sentence() {
+    let (mut app, terrain, folder) = editor("refused");
+    let note = |app: &App| app.world().resource::<BurrowPanel>().note.clone();
+    dig_at(&mut app, terrain, 20.0);
+    act(&mut app, PanelAction::SaveLevel, None);
+    // A world of another size.
+    let ground = Ground::flat(80, 80, 8.0).expect("valid");
+    let other = Terrain::new(ground, &TerrainSettings::default()).expect("valid");
+    app.world_mut().entity_mut(terrain).insert(other);
+    app.world_mut().resource_mut::<Files>().note_opened(terrain, None);
+    let own = hash(&app, terrain);
+    app.update();
+    act(&mut app, PanelAction::LoadLevel, None);
+    assert_eq!((note(&app), hash(&app, terrain)), (Some(Note::Bad(texts::OTHER_GROUND.into())), own));
+    app.world_mut().resource_mut::<BurrowPanel>().level = Default::default();
+    for action in [PanelAction::SaveLevel, PanelAction::SaveLevelAs, PanelAction::LoadLevel] {
+        app.world_mut().resource_mut::<BurrowPanel>().note = None;
+        act(&mut app, action, None);
+        assert_eq!(note(&app), Some(Note::Bad(texts::NO_FOLDER.into())), "{action:?}");
+    }
+    std::fs::remove_dir_all(folder).expect("removed");
+}

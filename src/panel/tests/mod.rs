@@ -86,6 +86,9 @@ impl Screen {
             let context = ui.ctx().clone();
             let was_typing = context.text_edit_focused();
             files::ask(&context, &mut self.files);
+            if show_elsewhere(&context, &self.panel) {
+                self.panel.note = None;
+            }
             fold_one(&context, true);
             let shown = self.tool.clone();
             let head = |ui: &mut Ui, panel: &mut BurrowPanel| {
@@ -160,6 +163,24 @@ impl Screen {
     fn press(&mut self, key: egui::Key, modifiers: Modifiers) {
         self.frame(vec![Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers }]);
     }
+}
+
+#[test]
+fn a_failure_is_seen_wherever_the_panel_hides_its_message() {
+    let mut screen = Screen::new(1280.0, 720.0, 1);
+    screen.panel.report(Err("The folder can't be written".into()));
+    screen.frame(vec![]);
+    let is_seen = |screen: &Screen| screen.places.0.contains_key(texts::MESSAGE);
+    assert!(!is_seen(&screen), "it is in the column");
+    unfold(&screen.context, WORLD, false);
+    (0..3).for_each(|_| screen.frame(vec![]));
+    assert!(is_seen(&screen));
+    screen.choose(texts::MESSAGE);
+    screen.frame(vec![]);
+    assert!(!is_seen(&screen) && screen.panel.note.is_none());
+    screen.panel.report(Ok("Saved".into()));
+    (0..2).for_each(|_| screen.frame(vec![]));
+    assert!(!is_seen(&screen), "what went well can wait");
 }
 
 #[test]
