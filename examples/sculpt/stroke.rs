@@ -104,8 +104,7 @@ pub fn aim(
     let cursor = window.cursor_position().filter(|_| pointer_is_free(input));
     let ray = cursor.and_then(|cursor| camera.viewport_to_world(place, cursor).ok());
     aim.0 = ray.and_then(|ray| terrains.raycast(ray, REACH));
-    let is_in_view = cursor.is_some();
-    let pointer = aim.0.map(|hit| hit.position).or(panel.pointer.filter(|_| !is_in_view));
+    let pointer = aim.0.map(|hit| hit.position).or(panel.pointer);
     if panel.pointer != pointer {
         panel.pointer = pointer;
     }
