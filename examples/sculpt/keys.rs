@@ -303,7 +303,8 @@ mod tests {
     #[test]
     fn ctrl_shift_z_works_again_after_shift_was_released_first() {
         let mut app = App::new();
-        app.add_message::<KeyboardInput>().add_message::<PanelAction>().add_systems(Update, command);
+        app.init_resource::<BrushTool>().add_message::<KeyboardInput>().add_message::<PanelAction>();
+        app.add_systems(Update, command);
         let mut keys = ButtonInput::<KeyCode>::default();
         keys.press(KeyCode::ControlLeft);
         keys.press(KeyCode::ShiftLeft);
@@ -317,5 +318,32 @@ mod tests {
         app.update();
         let actions = app.world().resource::<Messages<PanelAction>>();
         assert_eq!(actions.len(), 2);
+    }
+
+    #[test]
+    fn ctrl_z_takes_back_the_points_of_a_path_before_edits() {
+        let mut app = App::new();
+        app.add_message::<KeyboardInput>().add_message::<PanelAction>().add_systems(Update, command);
+        let points = vec![Vec3::ZERO, Vec3::X];
+        app.insert_resource(BrushTool { shape: ToolShape::Path, points, ..BrushTool::default() });
+        let mut keys = ButtonInput::<KeyCode>::default();
+        keys.press(KeyCode::ControlLeft);
+        app.insert_resource(keys);
+        let mut undo = || {
+            app.world_mut().write_message(KeyboardInput {
+                key_code: KeyCode::KeyZ,
+                logical_key: Key::Character("z".into()),
+                state: ButtonState::Pressed,
+                text: None,
+                repeat: false,
+                window: Entity::PLACEHOLDER,
+            });
+            app.update();
+            (
+                app.world().resource::<BrushTool>().points.len(),
+                app.world().resource::<Messages<PanelAction>>().len(),
+            )
+        };
+        assert_eq!([undo(), undo(), undo()], [(1, 0), (0, 0), (0, 1)]);
     }
 }
