@@ -78,6 +78,11 @@ fn name_keys(mut panel: ResMut<BurrowPanel>) {
     panel.keys = operations.chain(BUTTON_KEYS).map(|(name, key)| (name.into(), key.into())).collect();
 }
 
+/// Whether points of a path are set that no edit was made of.
+fn has_path(tool: &BrushTool) -> bool {
+    !tool.points.is_empty() && tool.fitting_shape() == ToolShape::Path
+}
+
 /// Enter makes an edit of the path's points, Backspace takes the last one back.
 fn path_keys(
     keys: Res<ButtonInput<KeyCode>>,
@@ -85,7 +90,7 @@ fn path_keys(
     mut strokes: ResMut<Strokes>,
     mut brushes: MessageWriter<Brush>,
 ) {
-    if tool.points.is_empty() || tool.fitting_shape() != ToolShape::Path {
+    if !has_path(&tool) {
         return;
     }
     if keys.just_pressed(KeyCode::Backspace) {
@@ -161,12 +166,11 @@ fn keys(
         actions.write(PanelAction::SavePicture);
     }
     if keys.just_pressed(KeyCode::Escape) {
-        let has_path = !tool.points.is_empty() && tool.fitting_shape() == ToolShape::Path;
-        if has_path {
+        let is_held = tool.placed.is_some() || has_path(&tool);
+        if has_path(&tool) {
             tool.points.clear();
         }
-        let is_placed = tool.placed.is_some() || has_path;
-        actions.write(if is_placed { PanelAction::ReleaseBrush } else { PanelAction::Quit });
+        actions.write(if is_held { PanelAction::ReleaseBrush } else { PanelAction::Quit });
     }
     if keys.just_pressed(KeyCode::KeyG) {
         actions.write(PanelAction::PlaceBrush);
@@ -200,7 +204,7 @@ fn command(
     for press in presses.read().filter(|press| is_due && press.state.is_pressed() && !press.repeat) {
         let action = match letter(press) {
             // The last point of a path was set after all edits.
-            Some('z') if !is_shift && tool.fitting_shape() == ToolShape::Path && !tool.points.is_empty() => {
+            Some('z') if !is_shift && has_path(&tool) => {
                 tool.points.pop();
                 continue;
             }

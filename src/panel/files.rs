@@ -114,11 +114,11 @@ pub(super) fn ask(context: &egui::Context, files: &mut Files) {
 }
 
 /// Shows a failure or running work at the top, for when the column that has the message is not in sight. Returns whether
-/// it was clicked away.
+/// a failure was clicked away.
 pub(super) fn alert(context: &egui::Context, note: Option<&Note>) -> bool {
-    let (color, text) = match note {
-        Some(Note::Bad(text)) => (BAD, text),
-        Some(Note::Busy(text)) => (FAINT, text),
+    let (color, text, sense) = match note {
+        Some(Note::Bad(text)) => (BAD, text, egui::Sense::click()),
+        Some(Note::Busy(text)) => (FAINT, text, egui::Sense::hover()),
         _ => return false,
     };
     let area = egui::Area::new(Id::new("burrow message")).order(egui::Order::Foreground);
@@ -127,7 +127,7 @@ pub(super) fn alert(context: &egui::Context, note: Option<&Note>) -> bool {
         theme::card().fill(theme::NIGHT).show(ui, |ui| {
             ui.set_max_width(320.0);
             let text = egui::Label::new(RichText::new(text).color(color).size(12.0));
-            let label = ui.add(text.sense(egui::Sense::click()));
+            let label = ui.add(text.sense(sense));
             widgets::note(ui, texts::MESSAGE, label.rect);
             label.clicked()
         })

@@ -251,6 +251,10 @@ mod tests {
             Level::of(&terrain)
         };
         let (old, new) = (level(&[30.0, 100.0]), level(&[100.0, 101.0, 170.0]));
+        assert!(
+            save_level("", &old).is_err() && !new_of(Path::new(level::LEVEL_JSON)).exists(),
+            "a folder without a name"
+        );
         let folder = std::env::temp_dir().join(format!("bevy_burrow_level_{}", std::process::id()));
         drop(fs::remove_dir_all(&folder));
         save_level(&folder, &old).unwrap();

@@ -80,9 +80,15 @@ impl Patch {
             Some(brick) => *brick,
             None => world.bricks.get(&pos).map(Arc::as_ref),
         };
-        for chunk in chunks {
+        let there = |chunk: ChunkPos| (chunk, world.bricks_near(world.grid.chunk_samples(chunk)).collect());
+        let mut near: BTreeMap<ChunkPos, BTreeSet<BrickPos>> = chunks.into_iter().map(there).collect();
+        for pos in own.keys() {
+            for chunk in world.grid.chunks_of(pos.samples()) {
+                near.entry(chunk).and_modify(|places| places.extend([*pos]));
+            }
+        }
+        for (chunk, places) in near {
             let (before, samples) = (State::fields(world, chunk), world.grid.chunk_samples(chunk));
-            let places: BTreeSet<BrickPos> = world.bricks_near(samples).chain(own.keys().copied()).collect();
             let parts = places.into_iter().filter_map(|pos| edited_part(pos, brick(pos)?, samples));
             let after = fitted(before, &parts.collect::<Vec<_>>(), &mut next);
             fields.extend((after != *before).then_some((chunk, after)));

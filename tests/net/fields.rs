@@ -47,7 +47,7 @@ fn undos_of_two_players_in_one_chunk_leave_no_field_behind() {
     assert_eq!(play.server.terrain().world().fields().count(), 0);
 }
 
-/// A reset shrinks a field, another player digs beside what is left of it, and the reset is undone.
+/// A reset shrinks a field, another player digs next to the rest, and the reset is undone.
 #[test]
 fn an_undone_reset_has_its_field_though_others_dug_in_the_chunk_since() {
     let ground = flat(64);
@@ -70,7 +70,7 @@ fn an_undone_reset_has_its_field_though_others_dug_in_the_chunk_since() {
     assert!(before.iter().all(|own| after.iter().any(|field| field.encloses(*own))), "{before:?} {after:?}");
 }
 
-/// A stroke that goes on after another player dug in its chunk.
+/// A stroke that continues after another player dug in its chunk.
 #[test]
 fn an_undone_stroke_leaves_the_fields_of_those_who_dug_between_its_edits() {
     let ground = flat(64);

@@ -184,7 +184,7 @@ fn without_chunks(receipts: Vec<Receipt>) -> Vec<Receipt> {
     receipts.into_iter().map(plain).collect()
 }
 
-/// The same world twice: one gets edits together, on three threads; the other one by one, on one thread, with chunks of
+/// One world twice: one copy gets edits together, on three threads; the other one by one, on one thread, with chunks of
 /// another size, and without meshes.
 struct Twins {
     together: Terrain,

@@ -22,7 +22,7 @@ pub(super) struct Builder {
     /// Of the columns.
     shares: Shares,
     /// Which cells are split across, row by row; see [`splits_across`](Self::splits_across).
-    across: Vec<bool>,
+    splits: Vec<bool>,
 }
 
 /// The vertex of a page's column with this number, relative to the column `low` at y = 0.
@@ -59,14 +59,14 @@ impl Builder {
             miss(a + across, a + 1) < miss(a, a + across + 1)
         };
         let splits = middles.iter().enumerate().map(is_across).collect();
-        Self { columns, stride, vertices, indices, places: FxHashMap::default(), shares, across: splits }
+        Self { columns, stride, vertices, indices, places: FxHashMap::default(), shares, splits }
     }
 
     /// Whether the cell with its lowest corner at these places is split along (x, z + s)-(x + s, z), and not along
     /// (x, z)-(x + s, z + s): the line whose middle is nearer to the ground. On a ridge that runs along the other one, each
     /// cell would be a tooth.
     pub fn splits_across(&self, [x, z]: [usize; 2]) -> bool {
-        self.across[z * (self.columns[0].len() - 1) + x]
+        self.splits[z * (self.columns[0].len() - 1) + x]
     }
 
     /// How many columns there are along x and along z.

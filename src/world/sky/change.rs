@@ -237,7 +237,7 @@ impl<'a> LightChange<'a> {
                 None => {}
             }
         }
-        // Without corners that are lit, it has the light of the air beside it.
+        // Without corners that are lit, it has the light of the air next to it.
         !is_lit_by_corners
             && self.before.air_beside(place, columns).is_some_and(|air| self.may_differ(air) == Some(true))
     }

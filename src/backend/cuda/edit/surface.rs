@@ -31,7 +31,7 @@ pub(in super::super) fn greatest_horizon(work: &PreparedEdits) -> i32 {
 }
 
 /// The most samples on a way that is shorter than a horizon. A distance is right after as many launches that spread
-/// distances, as each of them goes on from the bricks around.
+/// distances, as each of them continues from the bricks around.
 pub(in super::super) fn steps(horizon: i32) -> i32 {
     (horizon - 1).max(0) / ONE
 }

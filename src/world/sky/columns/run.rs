@@ -10,7 +10,7 @@ pub(in crate::world::sky) struct Run {
 }
 
 impl Run {
-    /// So far apart that a run stays empty wherever it is moved.
+    /// Its ends are far enough apart that it stays empty wherever it is moved.
     pub const EMPTY: Self = Self { start: i32::MAX / 2, end: i32::MIN / 2 };
 
     pub fn is_empty(self) -> bool {

@@ -1,4 +1,4 @@
-//! What a commit changes in the light, compared with light that is computed anew.
+//! What a commit changes in the light, compared with light that is computed from scratch.
 
 use super::*;
 use crate::lattice::{ChunkGrid, ChunkPos, TilePos};
