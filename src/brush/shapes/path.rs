@@ -181,9 +181,9 @@ impl QuantizedPath {
         for (index, pair) in corners.windows(2).enumerate() {
             let [(from, from_radius), (to, to_radius)] = [pair[0], pair[1]];
             let radii = [f64::from(from_radius), f64::from(to_radius)];
-            let count = if self.is_smooth { pieces(to - from) } else { 1 };
             let before = place(index.saturating_sub(1));
             let [first, second] = [from + (to - before) / 6.0, to - (place(index + 2) - from) / 6.0];
+            let count = if self.is_smooth { pieces([from, first, second, to]) } else { 1 };
             nodes.extend((1..=count).map(|step| {
                 let t = f64::from(step) / f64::from(count);
                 let between = |a: DVec3, b: DVec3| a + (b - a) * t;
@@ -227,9 +227,12 @@ impl QuantizedPath {
     }
 }
 
-/// The number of straight pieces between two points this way apart: one for each voxel, up to a limit.
-fn pieces(way: DVec3) -> i32 {
-    ((way.length() / f64::from(ONE)).ceil() as i32).clamp(1, PIECES)
+/// The number of straight pieces that stand for a curve with these control points: one for each voxel of the lines
+/// between them, which are at least as long as the curve, up to a limit. Close points of a path with distant neighbours
+/// have a long curve between them.
+fn pieces(points: [DVec3; 4]) -> i32 {
+    let length: f64 = points.windows(2).map(|ends| (ends[1] - ends[0]).length()).sum();
+    ((length / f64::from(ONE)).ceil() as i32).clamp(1, PIECES)
 }
 
 fn check_count(count: usize) -> Result<(), BrushError> {
@@ -318,7 +321,9 @@ mod tests {
             let point = |index: usize| points[index.min(points.len() - 1)].0;
             let [a, b, c, d] =
                 [point(index.saturating_sub(2)), point(index - 1), point(index), point(index + 1)];
-            let count = ((c - b).length().ceil() as i32).clamp(1, PIECES);
+            let control = [b, b + (c - a) / 6.0, c - (d - b) / 6.0, c];
+            let length: f64 = control.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+            let count = (length.ceil() as i32).clamp(1, PIECES);
             nodes.extend((1..=count).map(|step| {
                 let t = f64::from(step) / f64::from(count);
                 // Hermite with the tangents of Catmull-Rom.
