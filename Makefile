@@ -12,9 +12,11 @@ export CARGO_TARGET_DIR ?= $(HOME)/.cache/bevy_burrow/target
 
 WITHOUT_BEVY := --no-default-features --features cuda,net,store,import,scatter,navigation
 comma := ,
-# What somebody may choose besides. Each set with Bevy has other features of Bevy's crates, so that much is checked anew.
+# What somebody may choose besides.
 SETS_WITHOUT_BEVY := '' format store net import scatter navigation
-SETS_WITH_BEVY := default plugin replicon render avian egui debug render,scatter landmass examples,gamepad examples,sound
+SETS_WITH_BEVY := plugin replicon render avian egui debug render,scatter landmass picking
+# Those that need headers.
+SETS_WITH_HEADERS := examples,gamepad examples,sound
 # Features besides: `make run MORE=gamepad` or MORE=gamepad,sound compiles some crates more.
 WITH_BEVY := --release --features examples$(MORE:%=$(comma)%)
 # `make run` has sound where it compiles: on Linux that takes ALSA's headers.
@@ -42,7 +44,7 @@ export BURROW_REQUIRE ?= 1
 endif
 
 .NOTPARALLEL:
-.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin drive soak crowd paper figures pictures scenes bench bench-backends peers instructions ptx sanitize
+.PHONY: help setup run example test test-model test-plugin test-examples features features-model features-plugin features-bevy drive soak crowd paper figures pictures scenes bench bench-backends peers instructions ptx sanitize
 
 help: ## List the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -85,7 +87,7 @@ test-examples:
 	@grep -q '"flawless": true' '$(PROOF)/export/report.json' && echo 'export: the mesh is flawless'
 	@$(MAKE) --no-print-directory drive
 
-features: features-model features-plugin ## Lint every set of features that can be chosen (features-model: those without Bevy)
+features: features-model features-plugin features-bevy ## Lint every set of features that can be chosen (features-model: those without Bevy)
 
 features-model:
 	@tools/setup.sh lint
@@ -95,9 +97,18 @@ features-model:
 	done
 	cargo clippy $(WITHOUT_BEVY) --all-targets -- -D warnings
 
+# With one build of Bevy. A test has to be there, or the dev-dependencies choose other features.
 features-plugin:
-	@MORE=gamepad,sound tools/setup.sh lint
+	@tools/setup.sh lint
 	@set -e; for set in $(SETS_WITH_BEVY); do \
+		echo "features: $$set"; \
+		cargo clippy --release --no-default-features --features "$$set,example_crates" --lib --test structure -- -D warnings; \
+	done
+
+# With the features of Bevy that each set chooses itself, so that much is checked anew.
+features-bevy:
+	@MORE=gamepad,sound tools/setup.sh lint
+	@set -e; for set in $(SETS_WITH_BEVY) $(SETS_WITH_HEADERS); do \
 		echo "features: $$set"; \
 		cargo clippy --release --no-default-features --features "$$set" --all-targets -- -D warnings; \
 	done

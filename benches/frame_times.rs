@@ -1,8 +1,9 @@
 //! The cost of digging per frame: `cargo bench --features examples --bench frame_times [-- SECONDS WIDTH HEIGHT
-//! [horizon] [moving] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x 16 km
-//! with levels of detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in full
-//! detail, and the meshes are counted that cast shadows in each cascade. With `moving`, a terrain of 4096 tiles is
-//! drawn while a child of it moves and while nothing does.
+//! [horizon] [moving] [large] [passes]]`; with 0 seconds materials alone are compared. With `horizon`, a world of 16 x
+//! 16 km with levels of detail and a plain material, with views of 0.5 to 16 km, is compared with the real landscape in
+//! full detail, and the meshes are counted that cast shadows in each cascade. With `moving`, a terrain of 4096 tiles is
+//! drawn while a child of it moves and while nothing does. With `large`, frames are timed around commits with hundreds
+//! of meshes.
 //!
 //! A walk over the real landscape with textures, shadows and fog, drawn without a window, at most 60 frames a second.
 //! Each backend plays the walk digging, with 20 brushes of radius 3 a second by the clock, and then again over the dug
@@ -42,6 +43,7 @@ use bevy_burrow::lattice::Column;
 use bevy_burrow::physics::{ColliderSource, PhysicsFigures, TerrainPhysicsPlugin};
 use bevy_burrow::plugin::MeshBytes;
 use bevy_burrow::prelude::*;
+use bevy_burrow::terrain::WorkLimits;
 use image::Rgb;
 
 /// Time between frames.
@@ -95,6 +97,10 @@ fn main() {
     }
     if is_asked("moving") {
         moving((width, height));
+        return;
+    }
+    if is_asked("large") {
+        large((width, height));
         return;
     }
     if frames == 0 {
@@ -473,6 +479,41 @@ fn moving(size: (u32, u32)) {
     let moving = report("a child of the terrain moves", moving);
     let [p50, p99] = [0, 1].map(|at| moving[at] / still[at]);
     println!("moving over still: p50 {p50:.3}, p99 {p99:.3}");
+}
+
+/// Digs 900 holes in one commit, again and again, and times frames: before, until it is shown, and after.
+fn large(size: (u32, u32)) {
+    let mut walk = Walk::new(Backend::Cpu, size, Scene::Landscape);
+    let world = walk.app.world_mut();
+    let mut terrains = world.query::<&mut Terrain>();
+    let mut terrain = terrains.single_mut(world).expect("one terrain");
+    terrain.set_work_limits(WorkLimits::UNBOUNDED);
+    let ground = terrain.world().shared_ground();
+    let hole = |number: i32, depth: f32| {
+        let at = Column::new(320 + number % 30 * 16, 260 + number / 30 * 16);
+        let height = ground.height(at) as f32 / 256.0;
+        Brush::dig(Shape::sphere(Vec3::new(at.x as f32, height - depth, at.z as f32), 3.0))
+    };
+    for _ in 0..WARM_UP {
+        walk.frame(1, false);
+    }
+    let [mut before, mut until, mut after] = [const { Vec::new() }; 3];
+    let (commits, swaps) = (walk.figures().commits, walk.figures().swaps);
+    let rounds = 10;
+    for round in 0..rounds {
+        before.extend((0..30).map(|_| walk.frame(1, false)));
+        walk.app.world_mut().write_message_batch((0..900).map(|number| hole(number, round as f32)));
+        until.push(walk.frame(1, false));
+        while !walk.is_committed() {
+            until.push(walk.frame(1, false));
+        }
+        after.extend((0..30).map(|_| walk.frame(1, false)));
+    }
+    let (commits, swaps) = (walk.figures().commits - commits, walk.figures().swaps - swaps);
+    println!("{rounds} times 900 holes: {commits} commits, {swaps} meshes");
+    report("nothing to do", before);
+    report("from the brushes until they are shown", until);
+    report("after them", after);
 }
 
 /// Draws scenes with a plain material, each less the frame with nothing in sight.

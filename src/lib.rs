@@ -333,7 +333,7 @@
 //! | `debug` | debug views as gizmos | |
 //! | `gamepad` | gamepads for the digger; needs libudev's headers on Linux | |
 //! | `sound` | sound for the digger; needs ALSA's headers on Linux | |
-//! | `examples` | what the examples need: window, UI, PNG | |
+//! | `examples`, `example_crates` | what the examples need: window, UI, PNG; its crates alone | |
 //! | `tools` | a simulated disk and random cuts for tests; not for games | |
 //!
 //! Without any feature only the model is built, without Bevy. Where threads are available, transactions, loads and

@@ -254,8 +254,8 @@ fn online_features(manifest: &str) -> BTreeSet<&str> {
 #[test]
 fn the_documentation_online_has_every_feature_of_the_library() {
     let manifest = read(&root().join("Cargo.toml"));
-    // `render`, and `plugin` with it, are on by default; the last four are for examples and tests only.
-    let others = ["default", "render", "plugin", "examples", "gamepad", "sound", "tools"];
+    // `render`, and `plugin` with it, are on by default; the others are for examples and tests only.
+    let others = ["default", "render", "plugin", "examples", "example_crates", "gamepad", "sound", "tools"];
     let expected = &features(&manifest) - &BTreeSet::from(others);
     assert_eq!(online_features(&manifest), expected);
     // So has the one that a reader builds.

@@ -6,13 +6,12 @@ use bevy::input::mouse::{AccumulatedMouseScroll, MouseScrollUnit};
 use bevy::prelude::*;
 use bevy::window::WindowCloseRequested;
 use bevy_burrow::panel::{
-    BrushTool, BurrowPanel, PanelAction, PanelInput, ToolOperation, ToolShape, keyboard_is_free,
-    pointer_is_free,
+    BrushTool, BurrowPanel, PanelAction, PanelInput, ToolOperation, keyboard_is_free, pointer_is_free,
 };
 use bevy_burrow::prelude::*;
 
 use crate::stamps;
-use crate::stroke::{Aim, Strokes, aim};
+use crate::stroke::{Aim, aim};
 
 /// Keys, and the wheel.
 pub struct KeysPlugin;
@@ -26,7 +25,6 @@ impl Plugin for KeysPlugin {
                 (
                     turn_wheel.run_if(pointer_is_free),
                     keys.run_if(keyboard_is_free),
-                    path_keys.run_if(keyboard_is_free).before(BurrowSystems::Collect),
                     command,
                     copy.after(aim),
                     ask_to_close,
@@ -78,31 +76,6 @@ fn name_keys(mut panel: ResMut<BurrowPanel>) {
     panel.keys = operations.chain(BUTTON_KEYS).map(|(name, key)| (name.into(), key.into())).collect();
 }
 
-/// Whether points of a path are set that no edit was made of.
-fn has_path(tool: &BrushTool) -> bool {
-    !tool.points.is_empty() && tool.fitting_shape() == ToolShape::Path
-}
-
-/// Enter makes an edit of the path's points, Backspace takes the last one back.
-fn path_keys(
-    keys: Res<ButtonInput<KeyCode>>,
-    mut tool: ResMut<BrushTool>,
-    mut strokes: ResMut<Strokes>,
-    mut brushes: MessageWriter<Brush>,
-) {
-    if !has_path(&tool) {
-        return;
-    }
-    if keys.just_pressed(KeyCode::Backspace) {
-        tool.points.pop();
-    }
-    if keys.any_just_pressed([KeyCode::Enter, KeyCode::NumpadEnter])
-        && let Some(brush) = tool.finish_path()
-    {
-        brushes.write(strokes.only(brush));
-    }
-}
-
 /// The wheel changes the size of the brush, or, while the right button is held, how fast the camera flies.
 fn turn_wheel(
     wheel: Res<AccumulatedMouseScroll>,
@@ -129,6 +102,7 @@ fn turn_wheel(
     }
 }
 
+/// Keys without Control, with which they are commands.
 fn keys(
     keys: Res<ButtonInput<KeyCode>>,
     aim: Res<Aim>,
@@ -138,6 +112,9 @@ fn keys(
     mut panel: ResMut<BurrowPanel>,
     mut actions: MessageWriter<PanelAction>,
 ) {
+    if keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]) {
+        return;
+    }
     for (key, factor) in [(KeyCode::BracketRight, 1.25), (KeyCode::BracketLeft, 0.8)] {
         if let (true, Some(terrain)) = (keys.just_pressed(key), &terrain) {
             tool.grow(factor, terrain.voxel_size());
@@ -165,11 +142,11 @@ fn keys(
     if keys.just_pressed(KeyCode::F12) {
         actions.write(PanelAction::SavePicture);
     }
+    if keys.just_pressed(KeyCode::Backspace) && tool.has_path() {
+        tool.points.pop();
+    }
     if keys.just_pressed(KeyCode::Escape) {
-        let is_held = tool.placed.is_some() || has_path(&tool);
-        if has_path(&tool) {
-            tool.points.clear();
-        }
+        let is_held = tool.placed.is_some() || tool.has_path();
         actions.write(if is_held { PanelAction::ReleaseBrush } else { PanelAction::Quit });
     }
     if keys.just_pressed(KeyCode::KeyG) {
@@ -204,7 +181,7 @@ fn command(
     for press in presses.read().filter(|press| is_due && press.state.is_pressed() && !press.repeat) {
         let action = match letter(press) {
             // The last point of a path was set after all edits.
-            Some('z') if !is_shift && has_path(&tool) => {
+            Some('z') if !is_shift && tool.has_path() => {
                 tool.points.pop();
                 continue;
             }

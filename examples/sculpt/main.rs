@@ -22,12 +22,12 @@
 //! | `Ctrl+Z`, `Ctrl+Y` or `Ctrl+Shift+Z` | undo, redo |
 //! | `Ctrl+N`, `Ctrl+O`, `Ctrl+S`, `Ctrl+Shift+S` | new, open, save, save as |
 //! | `H` | takes the height under the mouse for levelling |
-//! | `F1` | shows and hides the panel |
+//! | `F1`, `Ctrl` with `+` or `-` | shows and hides the panel; makes it larger or smaller |
 //! | `F12` | saves a picture |
 //! | a PNG dropped on the window | becomes the stamp, as with `--stamp`: plain grey, white is high |
 //! | a `.prefab` dropped on the window | is pasted |
 //! | a `.glb` or `.gltf` with closed meshes dropped on the window | becomes the brush's shape, as with `--model` |
-//! | `Esc` | quits, and asks before changes are lost |
+//! | `Esc` | quits, and asks before changes are lost; cancels a question |
 //!
 //! With `--headless`, or without a display, a script sculpts instead and saves pictures, panel included, in `--out`.
 //! Each stroke's receipt is a line on standard output.

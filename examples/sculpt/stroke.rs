@@ -78,12 +78,6 @@ impl Plugin for StrokePlugin {
 }
 
 impl Strokes {
-    /// A brush that is a stroke of its own.
-    pub fn only(&mut self, brush: Brush) -> Brush {
-        self.number += 1;
-        self.next(brush)
-    }
-
     /// The next brush of a stroke.
     fn next(&mut self, brush: Brush) -> Brush {
         self.count += 1;
@@ -197,6 +191,19 @@ fn stroke(
     strokes.rest = Timer::new(Duration::from_secs_f32(1.0 / tool.rate.max(0.1)), TimerMode::Once);
 }
 
+/// Positions along the curve of [`BrushPath::spline`](bevy_burrow::brush::BrushPath::spline).
+fn curve_through(points: &[Vec3]) -> Vec<Vec3> {
+    let corners = points.windows(2).enumerate().map(|(index, ends)| {
+        let before = points[index.saturating_sub(1)];
+        let after = points[(index + 2).min(points.len() - 1)];
+        [ends[0], ends[0] + (ends[1] - before) / 6.0, ends[1] - (after - ends[0]) / 6.0, ends[1]]
+    });
+    match CubicBezier::new(corners).to_curve() {
+        Ok(curve) => curve.iter_positions(16 * points.len()).collect(),
+        Err(_) => points.to_vec(),
+    }
+}
+
 /// Positions along a straight line, at most `apart` from each other, up to its end. Without a start, only the end.
 fn line(from: Option<Vec3>, to: Vec3, apart: f32) -> impl Iterator<Item = Vec3> {
     let steps = from.map_or(0, |from| (from.distance(to) / apart.max(0.25)).ceil().min(400.0) as u32);
@@ -226,7 +233,8 @@ fn preview(
         draw_shape(&mut gizmos, &tool.shape_at(hit), color.with_alpha(0.5));
     }
     if tool.fitting_shape() == ToolShape::Path {
-        gizmos.linestrip(tool.points.iter().copied().chain([hit.position]), color);
+        let points: Vec<Vec3> = tool.points.iter().copied().chain([hit.position]).collect();
+        gizmos.linestrip(if tool.is_smooth { curve_through(&points) } else { points }, color);
         for point in &tool.points {
             draw_shape(&mut gizmos, &Shape::sphere(*point, tool.radius), color.with_alpha(0.3));
         }

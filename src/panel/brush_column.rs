@@ -21,12 +21,13 @@ pub fn head(
 ) {
     let width = share(ui, 4);
     let is_placed = tool.placed.is_some();
+    let is_held = is_placed || tool.has_path();
     ui.horizontal(|ui| {
         for (name, help, action, is_enabled) in [
             (texts::PLACE, texts::PLACE_HELP, PanelAction::PlaceBrush, has_terrain && tool.can_be_placed()),
-            (texts::APPLY, texts::APPLY_HELP, PanelAction::ApplyBrush, has_terrain && is_placed),
+            (texts::APPLY, texts::APPLY_HELP, PanelAction::ApplyBrush, has_terrain && is_held),
             (texts::SNAP, texts::SNAP_HELP, PanelAction::SnapBrush, has_terrain && is_placed),
-            (texts::RELEASE, texts::RELEASE_HELP, PanelAction::ReleaseBrush, is_placed),
+            (texts::RELEASE, texts::RELEASE_HELP, PanelAction::ReleaseBrush, is_held),
         ] {
             if key_button(ui, (name, help), &panel.keys, width, is_enabled) {
                 actions.push(action);
@@ -73,14 +74,15 @@ pub fn show(
 }
 
 fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel) {
-    let names: Vec<&str> = OPERATIONS.iter().map(|row| row.name()).collect();
+    let (names, help): (Vec<&str>, Vec<&str>) =
+        OPERATIONS.iter().map(|row| (row.name(), row.help())).unzip();
     let chosen = OPERATIONS.iter().position(|row| row.tool == tool.operation).unwrap_or_default();
     let clicked = tiles(
         ui,
         5,
         &names,
         chosen,
-        |_| true,
+        |at| Ok(help.get(at).copied().unwrap_or_default()),
         |ui, at, rect, color| {
             let Some(row) = OPERATIONS.get(at) else { return };
             let place =
@@ -132,8 +134,11 @@ fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel
 fn shape(ui: &mut Ui, tool: &mut BrushTool, voxel: f32) {
     let now = tool.fitting_shape();
     let chosen = ToolShape::ALL.iter().position(|&shape| shape == now).unwrap_or_default();
-    let fits = |at: usize| ToolShape::ALL.get(at).is_some_and(|&shape| tool.operation.fits(shape));
-    let clicked = tiles(ui, 4, &texts::SHAPES, chosen, fits, |ui, at, rect, color| {
+    let help = |at: usize| match ToolShape::ALL.get(at) {
+        Some(&shape) if tool.operation.fits(shape) => Ok(""),
+        _ => Err(texts::FITS_NOT),
+    };
+    let clicked = tiles(ui, 4, &texts::SHAPES, chosen, help, |ui, at, rect, color| {
         let color = if at == chosen { ACCENT } else { color };
         if let Some(&shape) = ToolShape::ALL.get(at) {
             draw_shape(ui, shape, rect, Stroke::new(1.5, color));

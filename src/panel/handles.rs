@@ -92,7 +92,7 @@ pub(super) fn hold_pointer(
     }
 }
 
-/// Performs the buttons for a placed brush.
+/// Performs the buttons for a placed brush and for paths.
 pub(super) fn act(
     mut actions: MessageReader<PanelAction>,
     mut cameras: Query<Eye, With<PrimaryEguiContext>>,
@@ -125,6 +125,9 @@ pub(super) fn act(
             (PanelAction::ApplyBrush, Some(hit)) if tool.can_be_placed() => {
                 brushes.write(tool.brush_at(&hit));
             }
+            (PanelAction::ApplyBrush, None) if tool.has_path() => {
+                brushes.write_batch(tool.finish_path());
+            }
             (PanelAction::SnapBrush, Some(mut hit)) => {
                 let floors = terrains.spans_on(hit.terrain, hit.position.x, hit.position.z).into_iter();
                 let floors = floors.map(|span| span.floor as f32);
@@ -138,6 +141,7 @@ pub(super) fn act(
                 }
             }
             (PanelAction::ReleaseBrush, Some(_)) => tool.placed = None,
+            (PanelAction::ReleaseBrush, None) if tool.has_path() => tool.points.clear(),
             _ => {}
         }
     }

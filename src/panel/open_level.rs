@@ -169,12 +169,8 @@ impl Files {
             _ => false,
         };
         let may_lose = self.may_lose.take_if(|own| *own == action).is_some();
+        // Until it is answered, nothing else is done.
         if self.question.is_some() {
-            // Until it is answered, nothing else is done. The key that asks also takes the question back; while a brush is
-            // placed, games may use it to release that.
-            if matches!(action, PanelAction::Quit | PanelAction::ReleaseBrush) {
-                (self.question, self.then) = (None, None);
-            }
             return None;
         }
         if loses && !may_lose {

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy_egui::EguiContext;
+use bevy_egui::egui::Key;
 
+use super::open_level::{Answer, Files};
 use super::texts;
 use crate::terrain::World;
 
@@ -129,13 +131,14 @@ pub enum PanelAction {
     /// [Places](super::BrushTool::placed) the brush where the pointer is on the ground, or, while the pointer is over
     /// the panel, where the middle of the view is.
     PlaceBrush,
-    /// Applies the placed brush, which stays where it is. Each time is one undo step.
+    /// Applies the placed brush, which stays where it is, or the [path](super::BrushTool::finish_path), whose points are
+    /// forgotten. Each time is one undo step.
     ApplyBrush,
     /// Moves the placed brush up or down to the nearest ground.
     SnapBrush,
-    /// Lets the placed brush follow the pointer again.
+    /// Lets the placed brush follow the pointer again, or drops the points of the path.
     ReleaseBrush,
-    /// Ends the app. Asks before unsaved changes are lost. If that is asked already, the question is taken back.
+    /// Ends the app. Asks before unsaved changes are lost.
     Quit,
 }
 
@@ -144,9 +147,10 @@ pub enum PanelAction {
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct PanelInput {
-    /// The pointer is over a widget, or a handle of a [placed brush](super::BrushTool::placed), or drags one.
+    /// The pointer is over a widget, or a handle of a [placed brush](super::BrushTool::placed), or drags one, or a question
+    /// has to be answered first.
     pub has_pointer: bool,
-    /// Text is being typed into a widget.
+    /// Text is being typed into a widget, or a question has to be answered first. Escape cancels it.
     pub has_keyboard: bool,
 }
 
@@ -169,13 +173,21 @@ pub fn keyboard_is_free(input: Option<Res<PanelInput>>) -> bool {
 
 /// Reads whether any egui context uses the input. Runs after egui has processed the frame's input and before
 /// systems that act on it.
-pub(super) fn read_input(mut contexts: Query<&mut EguiContext>, mut input: ResMut<PanelInput>) {
-    let mut now = PanelInput::default();
+pub(super) fn read_input(
+    mut contexts: Query<&mut EguiContext>,
+    mut files: ResMut<Files>,
+    mut input: ResMut<PanelInput>,
+) {
+    let is_asking = files.is_asking();
+    let mut now = PanelInput { has_pointer: is_asking, has_keyboard: is_asking };
     for mut context in &mut contexts {
         let context = context.get_mut();
         now.has_pointer |= context.is_pointer_over_egui() || context.egui_is_using_pointer();
         // Keyboard focus alone does not count as typing.
         now.has_keyboard |= context.text_edit_focused();
+        if is_asking && context.input(|input| input.key_pressed(Key::Escape)) {
+            files.answer = Some(Answer::Cancel);
+        }
     }
     input.set_if_neq(now);
 }

@@ -32,15 +32,15 @@ texts! {
     COPY_HELP = "The last copy, or a prefab file dropped on the window", MIRRORED = "Mirrored",
     ROUNDING = "Rounding", MODEL = "Model", BOULDER = "Boulder", MODEL_HELP = "The closed meshes of a glTF file dropped on the window",
     EDITS_ONLY = "Edits only", SMOOTH_PATH = "Curved", PATH_POINTS = "Points",
-    PATH_HELP = "Each click sets a point. The path is one edit and one undo step.",
+    PATH_HELP = "Each click sets a point. Apply makes the path, as one edit and one undo step; Release drops the points.",
 }
 
 // A placed brush.
 texts! {
     PLACE = "Place", PLACE_HELP = "Puts the brush in the middle of the view, with handles to move, turn and scale it",
-    APPLY = "Apply", APPLY_HELP = "Applies the placed brush. Each time is one undo step.",
+    APPLY = "Apply", APPLY_HELP = "Applies the placed brush or the path. Each time is one undo step.",
     SNAP = "Snap", SNAP_HELP = "Moves the placed brush up or down to the nearest ground",
-    RELEASE = "Release", RELEASE_HELP = "Lets the brush follow the mouse again",
+    RELEASE = "Release", RELEASE_HELP = "Lets the brush follow the mouse again, or drops the points of the path",
     NO_GROUND = "There is no ground to place the brush on", MOVE_OVER_GROUND = "Move over the ground",
     MOVE = "Move along", TURN_ABOUT = "Turn about", SCALE = "Scale along",
 }
@@ -115,11 +115,14 @@ pub const LOOSE_SIZES: [(&str, &str); 3] = [
 pub const VOXELS: &str = " voxels";
 pub const LOOK: &str = "Look";
 pub const QUALITY: [&str; 2] = ["Plain", "Fine"];
+/// Sizes of the panel, and their names.
+pub const UI_SCALES: [(f32, &str); 5] =
+    [(0.75, "75 %"), (1.0, "100 %"), (1.25, "125 %"), (1.5, "150 %"), (2.0, "200 %")];
 texts! {
     VARIETY = "Variety", VARIETY_HELP = "How much colours vary from place to place",
     SCALE_STARTS = "Scale from", SCALE_ENDS = "Scale to",
     SCALE_HELP = "Distances at which textures start to grow, and where they are six times as large",
-    SETTINGS = "Settings", UNDO_MEMORY = "History",
+    SETTINGS = "Settings", UI_SCALE = "Size of the panel", UI_SCALE_HELP = "Also Ctrl with + and -", UNDO_MEMORY = "History",
     UNDO_MEMORY_HELP = "Memory that the undo history of this terrain may use", SWAPS = "Swaps",
     SWAPS_HELP = "Meshes that are replaced per frame, at most, after edits. Fewer make frames smoother.",
     LOADS = "Loads",

@@ -48,6 +48,11 @@ impl BrushTool {
         self.model.shape(self.middle(hit), self.rotation(hit), self.radius)
     }
 
+    /// Whether points of a path are set that no edit was made of.
+    pub fn has_path(&self) -> bool {
+        !self.points.is_empty() && self.fitting_shape() == ToolShape::Path
+    }
+
     /// The brush along the points of its path, which are forgotten. `None` without points.
     pub fn finish_path(&mut self) -> Option<Brush> {
         let hit = hit_at(self.points.pop()?, Vec3::Y);

@@ -34,7 +34,13 @@ pub fn note_in(context: &Context, name: &str, rect: Rect) {
 
 /// Takes the positions of this frame's widgets.
 pub fn places(context: &Context) -> PanelPlaces {
-    context.data_mut(|data| std::mem::take(data.get_temp_mut_or_default::<Drawn>(Id::NULL))).0
+    let Drawn(mut places) =
+        context.data_mut(|data| std::mem::take(data.get_temp_mut_or_default::<Drawn>(Id::NULL)));
+    let zoom = context.zoom_factor();
+    for place in places.0.values_mut() {
+        *place = bevy::math::Rect { min: place.min * zoom, max: place.max * zoom };
+    }
+    places
 }
 
 /// The title of a column, and whether it was clicked: that folds the column, or unfolds it.
@@ -66,13 +72,14 @@ pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl Fn
     state.show_body_unindented(ui, content);
 }
 
-/// A grid of tiles with `columns` per row, of which some can't be chosen; returns which one was clicked.
+/// A grid of tiles with `columns` per row; returns which one was clicked. Their help is shown on hover: an error says why
+/// a tile can't be chosen.
 pub fn tiles(
     ui: &mut Ui,
     columns: usize,
     names: &[&str],
     chosen: usize,
-    is_enabled: impl Fn(usize) -> bool,
+    help: impl Fn(usize) -> Result<&'static str, &'static str>,
     icon: impl Fn(&Ui, usize, Rect, Color32),
 ) -> Option<usize> {
     let gap = 6.0;
@@ -83,13 +90,15 @@ pub fn tiles(
             ui.spacing_mut().item_spacing.x = gap;
             for (column, name) in line.iter().enumerate() {
                 let at = row * columns + column;
-                let is_enabled = is_enabled(at);
+                let help = help(at);
+                let is_enabled = help.is_ok();
                 let sense = if is_enabled { Sense::click() } else { Sense::hover() };
                 let (rect, response) = ui.allocate_exact_size(Vec2::new(width, 48.0), sense);
                 note(ui, name, rect);
                 let color = frame_tile(ui, rect, &response, at == chosen);
                 let color = if is_enabled { color } else { FAINT.gamma_multiply(0.4) };
-                let response = if is_enabled { response } else { response.on_hover_text(texts::FITS_NOT) };
+                let (Ok(help) | Err(help)) = help;
+                let response = if help.is_empty() { response } else { response.on_hover_text(help) };
                 let area = Rect::from_min_max(
                     rect.min + Vec2::new(10.0, 6.0),
                     Pos2::new(rect.right() - 10.0, rect.bottom() - 19.0),
@@ -236,7 +245,8 @@ pub fn key_button(
 ) -> bool {
     let key = keys.get(name).map(|key| format!("\n{key}")).unwrap_or_default();
     let response = button(ui, name, width, is_enabled);
-    response.on_hover_text(format!("{help}{key}")).clicked()
+    let help = format!("{help}{key}");
+    response.on_hover_text(&help).on_disabled_hover_text(&help).clicked()
 }
 
 /// Width of one of `count` buttons in a row.

@@ -248,6 +248,13 @@ fn settings(ui: &mut Ui, undo_budget: Option<&mut usize>, settings: &mut BurrowS
         .on_hover_text(texts::SWAPS_HELP);
     slider(ui, texts::LOADS, &mut settings.loads_per_frame, 1..=4096, |slider| slider.logarithmic(true))
         .on_hover_text(texts::LOADS_HELP);
+    let zoom = ui.ctx().zoom_factor();
+    ui.label(texts::UI_SCALE).on_hover_text(texts::UI_SCALE_HELP);
+    let now = texts::UI_SCALES.iter().position(|(scale, _)| (scale - zoom).abs() < 0.01);
+    let clicked = choice(ui, &texts::UI_SCALES.map(|(_, name)| name), now.unwrap_or(usize::MAX));
+    if let Some((scale, _)) = clicked.and_then(|at| texts::UI_SCALES.get(at)) {
+        ui.ctx().set_zoom_factor(*scale);
+    }
 }
 
 /// Draws the switches of the debug views.

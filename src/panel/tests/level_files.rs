@@ -164,7 +164,8 @@ fn a_question_that_is_taken_back_takes_what_would_follow_with_it() {
     dig_at(&mut app, terrain, 20.0);
     assert!(act(&mut app, PanelAction::Quit, Some(texts::SAVE_CHANGES)));
     assert!(app.world().resource::<Files>().is_asking(), "whether the folder's content is replaced");
-    act(&mut app, PanelAction::Quit, None);
+    app.world_mut().resource_mut::<Files>().reply(texts::CANCEL);
+    app.update();
     assert!(!app.world().resource::<Files>().is_asking());
     app.world_mut().resource_mut::<BurrowPanel>().level = other.clone();
     assert!(!act(&mut app, PanelAction::SaveLevel, None));

@@ -604,6 +604,18 @@ fn a_game_that_saves_its_worlds_itself_hides_the_files() {
 }
 
 #[test]
+fn the_panel_is_larger_or_smaller_as_one_likes() {
+    let mut screen = Screen::new(1280.0, 1600.0, 1);
+    screen.choose("Settings");
+    let place = screen.places.0["Undo"];
+    screen.choose("150 %");
+    assert_eq!(screen.context.zoom_factor(), 1.5);
+    // Positions are those in the window.
+    let larger = screen.places.0["Undo"];
+    assert!((larger.min - 1.5 * place.min).length() < 1.0 && larger.width() > 1.4 * place.width());
+}
+
+#[test]
 fn messages_of_success_expire() {
     let mut app = App::new();
     app.insert_resource(Time::<Real>::default())
@@ -622,7 +634,7 @@ fn messages_of_success_expire() {
 #[test]
 fn any_context_of_egui_may_have_the_pointer() {
     let mut app = App::new();
-    app.init_resource::<PanelInput>().add_systems(Update, state::read_input);
+    app.init_resource::<PanelInput>().init_resource::<Files>().add_systems(Update, state::read_input);
     // The context of another camera than the panel's.
     let camera = app.world_mut().spawn(EguiContext::default()).id();
     let mut camera = app.world_mut().entity_mut(camera);

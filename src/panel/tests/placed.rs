@@ -302,6 +302,7 @@ fn the_pointer_is_free_when_the_camera_is_gone() {
 fn a_question_comes_before_a_placed_brush() {
     let mut stage = Stage::new();
     stage.app.add_systems(Update, files::track_changes.after(note_rejection));
+    stage.app.add_systems(Update, files::answer.before(handles::act));
     stage.change(placed_box);
     stage.act(PanelAction::PlaceBrush);
     stage.apply();
@@ -314,11 +315,42 @@ fn a_question_comes_before_a_placed_brush() {
     stage.act(PanelAction::ApplyBrush);
     (0..5).for_each(|_| stage.frame(Vec::new()));
     assert_eq!(stage.hash(), built);
-    // The key that releases a brush takes the question back first.
+    // Neither keys nor clicks are meant for the game. Escape takes the question back, and nothing else.
+    let input = *stage.app.world().resource::<PanelInput>();
+    assert_eq!(input, PanelInput { has_pointer: true, has_keyboard: true });
     stage.act(PanelAction::ReleaseBrush);
+    let (key, modifiers) = (egui::Key::Escape, Modifiers::NONE);
+    stage.frame(vec![Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers }]);
     assert_eq!((is_asked(&stage), stage.placed()), (false, placed));
+    stage.frame(Vec::new());
+    assert!(!stage.app.world().resource::<PanelInput>().has_keyboard);
     stage.act(PanelAction::ReleaseBrush);
     assert!(stage.tool().placed.is_none());
+}
+
+#[test]
+fn the_points_of_a_path_are_applied_or_dropped_by_the_same_buttons() {
+    let mut stage = Stage::new();
+    let points = |tool: &mut BrushTool| {
+        tool.shape = ToolShape::Path;
+        tool.points = vec![Vec3::new(20.0, 8.0, 20.0), Vec3::new(40.0, 8.0, 40.0)];
+    };
+    let pristine = stage.hash();
+    stage.act(PanelAction::ApplyBrush);
+    stage.change(points);
+    stage.click("Release");
+    assert_eq!((stage.tool().points.len(), stage.hash()), (0, pristine));
+    stage.change(points);
+    stage.apply();
+    assert_eq!(stage.tool().points.len(), 0);
+    assert_ne!(stage.hash(), pristine);
+    // Points that another shape has forgotten are not applied.
+    let dug = stage.hash();
+    stage.change(points);
+    stage.change(|tool| tool.shape = ToolShape::Box);
+    stage.act(PanelAction::ApplyBrush);
+    (0..5).for_each(|_| stage.frame(Vec::new()));
+    assert_eq!(stage.hash(), dug);
 }
 
 #[test]
