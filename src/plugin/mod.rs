@@ -98,9 +98,9 @@ pub use messages::{
 };
 #[cfg(feature = "picking")]
 pub use picking::TerrainPickingPlugin;
-pub(crate) use places::Places;
 #[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
-#[cfg(any(feature = "scatter", feature = "landmass", feature = "debug"))]
+pub(crate) use places::Places;
+#[cfg(any(feature = "scatter", feature = "landmass", feature = "debug", feature = "egui"))]
 pub(crate) use places::voxel_metres;
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 pub use propagate::TerrainPropagatePlugin;
