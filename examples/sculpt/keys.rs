@@ -177,9 +177,12 @@ fn command(
     mut actions: MessageWriter<PanelAction>,
 ) {
     let is_shift = keys.any_pressed([KeyCode::ShiftLeft, KeyCode::ShiftRight]);
-    let is_due = keyboard_is_free(panel) && keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
-    for press in presses.read().filter(|press| is_due && press.state.is_pressed() && !press.repeat) {
+    let is_command = keys.any_pressed([KeyCode::ControlLeft, KeyCode::ControlRight]);
+    let is_free = keyboard_is_free(panel);
+    for press in presses.read().filter(|press| is_command && press.state.is_pressed() && !press.repeat) {
         let action = match letter(press) {
+            // Text has an undo of its own.
+            Some('z' | 'y') if !is_free => continue,
             // The last point of a path was set after all edits.
             Some('z') if !is_shift && tool.has_path() => {
                 tool.points.pop();

@@ -9,7 +9,9 @@ use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_burrow::brush::Blend;
 use bevy_burrow::debug::draw_shape;
-use bevy_burrow::panel::{BrushTool, BurrowPanel, PanelInput, ToolOperation, ToolShape, pointer_is_free};
+use bevy_burrow::panel::{
+    BrushTool, BurrowPanel, PanelAction, PanelInput, ToolOperation, ToolShape, pointer_is_free,
+};
 use bevy_burrow::prelude::*;
 
 /// The reach of the brush in metres.
@@ -45,6 +47,8 @@ pub struct Strokes {
     count: u64,
     /// The stroke that is drawn: one press of the button, and one step of undo.
     number: u64,
+    /// Whether that stroke goes on while the button is held.
+    is_held: bool,
     rest: Timer,
     /// Where the last brush was.
     last: Option<Vec3>,
@@ -69,7 +73,7 @@ impl Plugin for StrokePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Strokes>().add_systems(
             Update,
-            (aim, read_modifier, stroke.run_if(pointer_is_free))
+            (aim, read_modifier, stroke)
                 .chain()
                 .before(BurrowSystems::Collect)
                 .before(preview),
@@ -104,8 +108,16 @@ pub fn aim(
     }
 }
 
-fn read_modifier(keys: Res<ButtonInput<KeyCode>>, mut modifier: ResMut<Modifier>) {
+/// A stroke keeps the modifier with which it began.
+fn read_modifier(
+    keys: Res<ButtonInput<KeyCode>>,
+    mouse: Res<ButtonInput<MouseButton>>,
+    mut modifier: ResMut<Modifier>,
+) {
     use KeyCode as K;
+    if mouse.pressed(MouseButton::Left) && !mouse.just_pressed(MouseButton::Left) {
+        return;
+    }
     *modifier = if keys.any_pressed([K::AltLeft, K::AltRight]) {
         Modifier::Pick
     } else if keys.pressed(K::KeyL) {
@@ -146,10 +158,12 @@ fn modified(tool: &BrushTool, modifier: Modifier) -> BrushTool {
 }
 
 /// Applies a brush at the first press, then at the tool's rate. All brushes until the button is released are one
-/// stroke.
+/// stroke; undo and redo end it.
 fn stroke(
     time: Res<Time>,
     mouse: Res<ButtonInput<MouseButton>>,
+    input: Option<Res<PanelInput>>,
+    mut actions: MessageReader<PanelAction>,
     modifier: Res<Modifier>,
     terrains: Terrains,
     aim: Res<Aim>,
@@ -158,8 +172,14 @@ fn stroke(
     mut brushes: MessageWriter<Brush>,
 ) {
     strokes.rest.tick(time.delta());
-    let is_first = mouse.just_pressed(MouseButton::Left);
-    if !(is_first || mouse.pressed(MouseButton::Left) && strokes.rest.is_finished()) {
+    let is_free = pointer_is_free(input);
+    let is_first = is_free && mouse.just_pressed(MouseButton::Left);
+    let steps = actions.read().filter(|action| matches!(action, PanelAction::Undo | PanelAction::Redo)).count();
+    strokes.is_held = is_first || strokes.is_held && mouse.pressed(MouseButton::Left) && steps == 0;
+    if is_first {
+        strokes.number += 1;
+    }
+    if !(strokes.is_held && is_free && (is_first || strokes.rest.is_finished())) {
         return;
     }
     let Some(hit) = &aim.0 else { return };
@@ -175,9 +195,6 @@ fn stroke(
             tool.add_point(hit);
         }
         return;
-    }
-    if is_first {
-        strokes.number += 1;
     }
     let tool = modified(&tool, *modifier);
     let from = strokes.last.filter(|_| *modifier == Modifier::Line);
@@ -223,9 +240,9 @@ fn preview(
     let Some(hit) = tool.placed.or(aim.0) else { return };
     let hit = &hit;
     let modifier = if tool.placed.is_some() { Modifier::None } else { *modifier };
-    let tool = modified(&tool, modifier);
+    let (shown, tool) = (&tool, modified(&tool, modifier));
     let color = match modifier {
-        Modifier::Invert => Color::srgb(1.0, 0.45, 0.35),
+        Modifier::Invert if tool.operation != shown.operation => Color::srgb(1.0, 0.45, 0.35),
         Modifier::Smooth => Color::srgb(0.45, 0.75, 1.0),
         _ => Color::srgb(1.0, 0.80, 0.30),
     };
@@ -307,6 +324,8 @@ mod tests {
             .init_resource::<Modifier>()
             .init_resource::<BrushTool>()
             .init_resource::<Strokes>()
+            .add_message::<PanelAction>()
+            .init_resource::<PanelInput>()
             .insert_resource(bevy::time::TimeUpdateStrategy::ManualDuration(Duration::from_millis(200)))
             .add_systems(Update, stroke.before(BurrowSystems::Collect))
             .add_systems(Last, |mut brushes: MessageReader<Brush>, mut sent: ResMut<Sent>| {
@@ -336,6 +355,31 @@ mod tests {
         assert!(first.len() > 3 && first.iter().all(|stroke| *stroke == first[0]), "{first:?}");
         let second = press(&mut app, 3);
         assert_ne!(first[0], second[0]);
+        // A press in the sky begins a stroke too, and one over the panel none.
+        let aim = app.world_mut().resource_mut::<Aim>().0.take();
+        let input = |has_pointer: bool| PanelInput { has_pointer, has_keyboard: false };
+        app.world_mut().resource_mut::<ButtonInput<MouseButton>>().press(MouseButton::Left);
+        app.update();
+        app.world_mut().resource_mut::<ButtonInput<MouseButton>>().clear();
+        app.insert_resource(Aim(aim));
+        app.update();
+        let third = std::mem::take(&mut app.world_mut().resource_mut::<Sent>().0);
+        assert!(third.len() == 1 && third[0] != second[0], "{third:?}");
+        // Undo ends it.
+        app.world_mut().write_message(PanelAction::Undo);
+        (0..3).for_each(|_| app.update());
+        assert!(app.world().resource::<Sent>().0.is_empty());
+        app.world_mut().resource_mut::<ButtonInput<MouseButton>>().release(MouseButton::Left);
+        app.update();
+        app.insert_resource(input(true));
+        app.world_mut().resource_mut::<ButtonInput<MouseButton>>().press(MouseButton::Left);
+        app.update();
+        app.world_mut().resource_mut::<ButtonInput<MouseButton>>().clear();
+        app.insert_resource(input(false));
+        (0..3).for_each(|_| app.update());
+        assert!(app.world().resource::<Sent>().0.is_empty());
+        app.world_mut().resource_mut::<ButtonInput<MouseButton>>().release(MouseButton::Left);
+        app.update();
         // A brush that was placed stays where it is.
         let aim = app.world().resource::<Aim>().0;
         app.world_mut().resource_mut::<BrushTool>().placed = aim;

@@ -43,10 +43,15 @@ pub(super) fn answer(
         {
             panel.report(Err(texts::SAVE_ELSEWHERE.into()));
         }
-        (Some(Question::Unsaved(action)), Some(Answer::Yes)) => {
-            files.then = Some(action);
-            actions.write(PanelAction::SaveLevel);
-        }
+        (Some(Question::Unsaved(action)), Some(Answer::Yes)) => match files.unsaved_before(action) {
+            Some(terrain) => {
+                files.choose(terrain);
+                (panel.terrain, files.then) = (Some(terrain), Some(action));
+                actions.write(PanelAction::SaveLevel);
+            }
+            // Its terrain is gone.
+            None => drop(actions.write(action)),
+        },
         (Some(Question::Replace(target)), Some(Answer::Yes)) => {
             if let Some(terrain) = chosen {
                 level::save(&mut commands, (&mut *panel, &mut *files), terrain, target);

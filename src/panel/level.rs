@@ -120,7 +120,8 @@ pub(super) fn finish(
             let Some(outcome) = task.finish() else { return };
             outcome.map(|terrain| {
                 commands.entity(*entity).try_insert(terrain);
-                files.note_opened(*entity, Some(folder.clone()));
+                // Nothing is saved in a packed file.
+                files.note_opened(*entity, Some(folder.clone()).filter(|folder| folder.is_dir()));
                 texts::opened(folder.display())
             })
         }

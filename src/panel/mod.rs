@@ -110,11 +110,12 @@ impl Plugin for BurrowPanelPlugin {
                     picture::finish,
                     level::finish,
                     picture::give_up,
+                    // Before anything that would lose changes.
+                    files::track_changes,
                     files::answer,
                     // Both read the same actions, whether a question is open or not.
                     handles::act,
                     perform_actions,
-                    files::track_changes,
                     note_rejection,
                     forget_note,
                 )
@@ -162,9 +163,17 @@ fn perform_actions(
                     PanelAction::SaveLevel => files.target(&panel),
                     _ => panel.level.clone(),
                 };
-                if target.as_os_str().is_empty() {
+                if terrain.is_none() {
                     files.forget_next();
-                    panel.report(Err(texts::NO_FOLDER.into()));
+                }
+                let why = match &target {
+                    target if target.as_os_str().is_empty() => Some(texts::NO_FOLDER),
+                    target if target.is_file() => Some(texts::PACKED_FILE),
+                    _ => None,
+                };
+                if let Some(why) = why {
+                    files.forget_next();
+                    panel.report(Err(why.into()));
                     continue;
                 }
                 terrain.into_iter().for_each(|own| {

@@ -111,10 +111,24 @@ impl Files {
         for (entity, terrain) in terrains {
             let mut level = self.levels.remove(&entity).unwrap_or_default();
             let saved = level.saved.get_or_insert_with(|| LevelState::of(terrain));
-            level.is_unsaved = !saved.is_still(terrain);
+            level.is_unsaved = !saved.is_still(terrain) || terrain.queued() > 0;
             there.insert(entity, level);
         }
         (self.levels, self.chosen) = (there, chosen);
+    }
+
+    /// The terrain whose changes an action would lose: the one that the file bar shows, if it has any.
+    pub fn unsaved_before(&self, action: PanelAction) -> Option<Entity> {
+        let others = self.levels.iter().filter(|(_, level)| level.is_unsaved).map(|(terrain, _)| *terrain);
+        match self.chosen.filter(|_| self.is_unsaved()) {
+            None if action == PanelAction::Quit => others.min(),
+            chosen => chosen,
+        }
+    }
+
+    /// Chooses the terrain whose level the file bar shows.
+    pub fn choose(&mut self, terrain: Entity) {
+        self.chosen = Some(terrain);
     }
 
     /// Whether the level that the file bar shows has unsaved changes.
@@ -136,7 +150,7 @@ impl Files {
         self.levels.insert(terrain, OpenLevel { from, ..OpenLevel::default() });
     }
 
-    /// Notes where a state of a terrain was saved. Whether it has changed since is found out once more.
+    /// Notes where a state of a terrain was saved. Whether it has changed since is found out before the next action.
     pub fn note_saved(&mut self, to: PathBuf, terrain: Entity, state: LevelState) {
         self.levels.insert(terrain, OpenLevel { from: Some(to), saved: Some(state), is_unsaved: false });
     }
@@ -163,11 +177,8 @@ impl Files {
 
     /// The action to perform now, if it may be: one that loses something is asked about first.
     pub fn admit(&mut self, action: PanelAction, panel: &BurrowPanel) -> Option<PanelAction> {
-        let loses = match action {
-            PanelAction::NewLevel | PanelAction::LoadLevel => self.is_unsaved(),
-            PanelAction::Quit => self.levels.values().any(|level| level.is_unsaved),
-            _ => false,
-        };
+        let may_lose = matches!(action, PanelAction::NewLevel | PanelAction::LoadLevel | PanelAction::Quit);
+        let loses = may_lose && self.unsaved_before(action).is_some();
         let may_lose = self.may_lose.take_if(|own| *own == action).is_some();
         // Until it is answered, nothing else is done.
         if self.question.is_some() {
@@ -182,7 +193,7 @@ impl Files {
             PanelAction::SaveLevelAs => panel.level.clone(),
             _ => return Some(action),
         };
-        if self.opened() != Some(&target) && target.exists() {
+        if self.opened() != Some(&target) && target.is_dir() {
             self.question = Some(Question::Replace(target));
             return None;
         }

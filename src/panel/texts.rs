@@ -86,6 +86,7 @@ texts! {
     UNSAVED_OPEN = "There are unsaved changes. They will be lost if another level is opened and they are not saved.",
     UNSAVED_NEW = "There are unsaved changes. They will be lost if you start a new level without saving them.",
     NO_FOLDER = "Type the level's folder first",
+    PACKED_FILE = "That is a packed level. Type the folder to save in.",
     SAVE_ELSEWHERE = "The changes are not saved: that folder holds the level to open. Save them in another folder first.",
     OTHER_GROUND = "The level was made on another ground, so it can't be opened here", MESSAGE = "Message",
     SAVE_CHANGES = "Save changes", DISCARD = "Discard changes", CANCEL = "Cancel", REPLACE = "Replace",

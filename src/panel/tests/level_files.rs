@@ -18,7 +18,7 @@ fn editor(name: &str) -> (App, Entity, std::path::PathBuf) {
         .add_message::<Redo>()
         .add_message::<AppExit>()
         .init_resource::<Exits>()
-        .add_systems(Update, (level::finish, files::answer, perform_actions, files::track_changes).chain())
+        .add_systems(Update, (level::finish, files::track_changes, files::answer, perform_actions).chain())
         .add_systems(Last, |mut exits: MessageReader<AppExit>, mut count: ResMut<Exits>| {
             count.0 += exits.read().count();
         });
@@ -116,6 +116,67 @@ fn changes_that_were_discarded_are_unsaved_still_where_nothing_came_in_their_pla
     assert!(app.world().resource::<Files>().is_unsaved());
     assert!(act(&mut app, PanelAction::Quit, Some(texts::CANCEL)));
     assert!(!folder.exists());
+}
+
+#[test]
+fn what_was_dug_while_a_level_was_saved_is_asked_about_again() {
+    let (mut app, terrain, folder) = editor("meanwhile");
+    dig_at(&mut app, terrain, 20.0);
+    app.world_mut().write_message(PanelAction::Quit);
+    app.update();
+    app.world_mut().resource_mut::<Files>().reply(texts::SAVE_CHANGES);
+    app.update();
+    assert!(app.world().resource::<Files>().is_busy);
+    app.world_mut().get_mut::<Terrain>(terrain).expect("it is there").apply([dig(40.0)]);
+    while app.world().resource::<Files>().is_busy {
+        app.update();
+    }
+    app.update();
+    assert!(app.world().resource::<Files>().is_asking() && app.world().resource::<Exits>().0 == 0);
+    app.world_mut().resource_mut::<Files>().reply(texts::CANCEL);
+    // So is what is not dug yet.
+    app.update();
+    assert!(!act(&mut app, PanelAction::SaveLevel, None) && !app.world().resource::<Files>().is_unsaved());
+    app.world_mut().get_mut::<Terrain>(terrain).expect("it is there").submit(dig(60.0));
+    assert!(act(&mut app, PanelAction::Quit, Some(texts::CANCEL)));
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn quitting_saves_the_terrain_that_has_changes_whichever_is_shown() {
+    let (mut app, first, folder) = editor("shown");
+    let second = app.world_mut().spawn(flat(1.0)).id();
+    app.world_mut().resource_mut::<BurrowPanel>().terrain = Some(first);
+    app.update();
+    dig_at(&mut app, second, 20.0);
+    assert!(act(&mut app, PanelAction::Quit, Some(texts::SAVE_CHANGES)));
+    assert_eq!((app.world().resource::<Exits>().0, folder.exists()), (1, true));
+    std::fs::remove_dir_all(folder).expect("removed");
+}
+
+#[test]
+fn a_terrain_that_is_gone_has_nothing_to_save() {
+    let (mut app, terrain, folder) = editor("gone");
+    dig_at(&mut app, terrain, 20.0);
+    assert!(act(&mut app, PanelAction::Quit, None));
+    app.world_mut().despawn(terrain);
+    app.world_mut().resource_mut::<Files>().reply(texts::SAVE_CHANGES);
+    (0..3).for_each(|_| app.update());
+    assert_eq!((app.world().resource::<Exits>().0, folder.exists()), (1, false));
+}
+
+#[test]
+fn nothing_is_saved_over_a_packed_level() {
+    let (mut app, terrain, folder) = editor("packed");
+    std::fs::write(&folder, b"packed").expect("a file");
+    dig_at(&mut app, terrain, 20.0);
+    for action in [PanelAction::SaveLevel, PanelAction::SaveLevelAs] {
+        assert!(!act(&mut app, action, None));
+        assert_eq!(app.world().resource::<BurrowPanel>().note, Some(Note::Bad(texts::PACKED_FILE.into())));
+    }
+    assert!(app.world().resource::<Files>().is_unsaved());
+    assert_eq!(std::fs::read(&folder).expect("it is there"), b"packed");
+    std::fs::remove_file(folder).expect("removed");
 }
 
 #[test]

@@ -301,7 +301,7 @@ fn the_pointer_is_free_when_the_camera_is_gone() {
 #[test]
 fn a_question_comes_before_a_placed_brush() {
     let mut stage = Stage::new();
-    stage.app.add_systems(Update, files::track_changes.after(note_rejection));
+    stage.app.add_systems(Update, files::track_changes.before(handles::act));
     stage.app.add_systems(Update, files::answer.before(handles::act));
     stage.change(placed_box);
     stage.act(PanelAction::PlaceBrush);
