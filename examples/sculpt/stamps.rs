@@ -81,7 +81,8 @@ fn take_dropped(
                 models.start(path_buf.clone());
                 continue;
             }
-            let is_prefab = path_buf.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(PREFAB));
+            let is_prefab =
+                path_buf.extension().is_some_and(|extension| extension.eq_ignore_ascii_case(PREFAB));
             panel.report(if is_prefab {
                 take_prefab(path_buf, &mut tool)
             } else {

@@ -73,10 +73,7 @@ impl Plugin for StrokePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Strokes>().add_systems(
             Update,
-            (aim, read_modifier, stroke)
-                .chain()
-                .before(BurrowSystems::Collect)
-                .before(preview),
+            (aim, read_modifier, stroke).chain().before(BurrowSystems::Collect).before(preview),
         );
     }
 }
@@ -174,7 +171,8 @@ fn stroke(
     strokes.rest.tick(time.delta());
     let is_free = pointer_is_free(input);
     let is_first = is_free && mouse.just_pressed(MouseButton::Left);
-    let steps = actions.read().filter(|action| matches!(action, PanelAction::Undo | PanelAction::Redo)).count();
+    let steps =
+        actions.read().filter(|action| matches!(action, PanelAction::Undo | PanelAction::Redo)).count();
     strokes.is_held = is_first || strokes.is_held && mouse.pressed(MouseButton::Left) && steps == 0;
     if is_first {
         strokes.number += 1;

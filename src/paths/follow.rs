@@ -21,8 +21,9 @@ pub(super) fn follow_commits(
         {
             let tiles = tiles.bypass_change_detection();
             let (Some(version), Some(walker)) = (tiles.version, tiles.walker.clone()) else { continue };
-            // Another world is loaded again as a whole. This system runs twice in a frame.
-            if !version.is_same_world(*after) || version == world.version() {
+            // Another world is loaded again as a whole. This system runs twice in a frame, so it may have followed this
+            // commit already.
+            if !version.is_same_world(*after) || version == *after || version == world.version() {
                 continue;
             }
             let mut stale: Vec<NavTilePos> = match boxes {

@@ -9,7 +9,6 @@ use crate::lattice::Column;
 use crate::physics::ColliderSource;
 use crate::plugin::{Places, position_on, voxel_metres};
 use crate::scatter::PlantId;
-use crate::terrain::Terrain;
 
 /// Metres around a source within which stems have colliders, if its own radius is not smaller.
 const NEAR: f32 = 32.0;
@@ -35,7 +34,7 @@ struct Stems(HashMap<PlantId, Entity>);
 
 fn keep_colliders(
     mut commands: Commands,
-    mut terrains: Query<(Entity, &ShownPlants, Option<&mut Stems>), With<Terrain>>,
+    mut terrains: Query<(Entity, &ShownPlants, Option<&mut Stems>)>,
     sources: Query<(Entity, &ColliderSource)>,
     places: Places,
 ) {

@@ -146,7 +146,7 @@ impl DrawnPlants {
 /// Draws what is loaded and changed since the last call.
 fn draw_plants(
     mut commands: Commands,
-    mut terrains: Query<(Entity, &Terrain, &mut ShownPlants, Ref<PlantLooks>, &mut DrawnPlants)>,
+    mut terrains: Query<(Entity, Option<&Terrain>, &mut ShownPlants, Ref<PlantLooks>, &mut DrawnPlants)>,
     mut buffers: ResMut<PlantBuffers>,
     mut assets: ResMut<Assets<ShaderBuffer>>,
     mut meshes: ResMut<Assets<Mesh>>,
@@ -174,7 +174,7 @@ fn draw_plants(
                 }
             }
         }
-        let Some(patches) = patches else { continue };
+        let (Some(patches), Some(terrain)) = (patches, terrain) else { continue };
         let species = patches.scatter().species();
         for pos in std::mem::take(&mut drawn.waiting) {
             let Some(own) = species.get(usize::from(pos.species)) else { continue };

@@ -52,8 +52,8 @@ pub(super) fn follow_commits(
             continue; // Another world: loaded again as a whole.
         }
         let world = model.world();
-        // This system runs twice in a frame.
-        if *version == Some(world.version()) {
+        // This system runs twice in a frame, so it may have followed this commit already.
+        if *version == Some(*after) || *version == Some(world.version()) {
             continue;
         }
         let changes: Vec<PlantChange> = match boxes {

@@ -49,6 +49,13 @@ pub(super) fn forget_rules(gone: On<Remove, Plants>, mut terrains: Query<&mut Sh
     }
 }
 
+/// Without ground there are none either.
+pub(super) fn forget_ground(gone: On<Remove, Terrain>, mut terrains: Query<&mut ShownPlants, Allow<Disabled>>) {
+    if let Ok(mut shown) = terrains.get_mut(gone.entity) {
+        shown.clear();
+    }
+}
+
 impl ShownPlants {
     /// Drops all patches.
     fn clear(&mut self) {

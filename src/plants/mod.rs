@@ -56,6 +56,7 @@ impl Plugin for PlantsPlugin {
         app.add_message::<PlantRemoved>()
             .add_message::<PlantReturned>()
             .add_observer(load::forget_rules)
+            .add_observer(load::forget_ground)
             .configure_sets(Update, PlantSystems.in_set(FollowCommits))
             .configure_sets(
                 PostUpdate,

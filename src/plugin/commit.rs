@@ -5,6 +5,7 @@ use std::time::Duration;
 use bevy::ecs::system::{SystemChangeTick, SystemParam};
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
+use bevy::window::ClosingWindow;
 
 use super::collect::{HistoryMessages, send_history};
 use super::diagnostics::measure_commit;
@@ -189,11 +190,12 @@ pub(super) fn commit_begun(
     mut same_frame: ResMut<SameFrame>,
     ticks: SystemChangeTick,
     exits: Option<Res<Messages<AppExit>>>,
+    closing: Query<(), With<ClosingWindow>>,
 ) {
     let begun = same_frame.bypass_change_detection().take();
     let most = commits.settings.same_frame;
     // A game that ends has no `Update` any more in which it could note what belongs to the edit.
-    let ends = exits.is_some_and(|exits| !exits.is_empty());
+    let ends = exits.is_some_and(|exits| !exits.is_empty()) || !closing.is_empty();
     if begun.is_empty() || !commits.has_meshes() || most.is_zero() || ends {
         return;
     }

@@ -81,6 +81,9 @@ pub(super) fn start_levels(
         }
         match made {
             Ok(Ok(mut made)) => {
+                if let Err(why) = made.adopt_settings(terrain.edit_settings()) {
+                    error!("the rules of {entity} could not be applied to its level: {why}");
+                }
                 made.take_over(&mut terrain);
                 free_later(std::mem::replace(&mut *terrain, made));
             }

@@ -7,6 +7,7 @@
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
+use bevy::window::ExitSystems;
 //! # use bevy_burrow::prelude::*;
 //! fn continue_game(mut commands: Commands) -> Result {
 //!     let ground = Ground::from_noise(512, 512, &NoiseHeights::default())?;
@@ -91,7 +92,7 @@ impl Plugin for SavePlugin {
                         .in_set(SaveSystems),
                 ),
             )
-            .add_systems(Last, saving::finish_at_exit);
+            .add_systems(Last, saving::finish_at_exit.after(ExitSystems));
         register_loader::<LevelLoader>(app);
     }
 

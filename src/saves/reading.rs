@@ -172,15 +172,8 @@ impl WorldReader {
         }
         let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
         let (mut terrain, warnings) = (opened.terrain, opened.warnings);
-        // A new version of the game may have other rules than the one that saved the world.
-        let EditSettings { rules, loose } = edit_settings;
-        if let Some(rules) = rules.as_deref().filter(|rules| terrain.rules() != Some(rules))
-            && let Err(why) = terrain.set_rules(rules.clone())
-        {
-            error!("the rules of the terrain do not hold for its saved world: {why}");
-        }
-        if loose.is_some() && loose.as_ref() != terrain.loose() {
-            terrain.set_loose(*loose);
+        if let Err(why) = terrain.adopt_settings(edit_settings) {
+            error!("the rules of the terrain could not be applied to its saved world: {why}");
         }
         Ok(Found::Old(ReadWorld { store, terrain, warnings }))
     }

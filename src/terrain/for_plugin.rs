@@ -3,11 +3,15 @@
 use std::sync::Arc;
 
 use super::commit::Commit;
+#[cfg(feature = "store")]
+use super::edit_settings::EditSettings;
 use super::history::DeferredDrop;
 use super::model::{StaleCommit, Terrain};
 use super::pending_display::PendingDisplay;
 use super::receipt::{Asked, Receipt};
 use crate::redraw::DrawnCut;
+#[cfg(feature = "store")]
+use crate::volume::RulesError;
 use crate::world::Version;
 
 impl Terrain {
@@ -75,6 +79,22 @@ impl Terrain {
     /// Sets the cut to draw from now on, or the whole world in full detail; the plugin shows it.
     pub(crate) fn draw_from_now_on(&mut self, drawn: Option<Arc<DrawnCut>>) {
         self.drawn_cut = drawn;
+    }
+
+    /// Sets the rules and loose settings that a game has set for the terrain in whose place this one comes: a new version
+    /// of the game may have others than the one that saved it. Those that the game has not set stay.
+    ///
+    /// # Errors
+    /// The rules are not valid for this ground. They stay as they were.
+    #[cfg(feature = "store")]
+    pub(crate) fn adopt_settings(&mut self, settings: &EditSettings) -> Result<(), RulesError> {
+        if settings.loose.is_some() && settings.loose.as_ref() != self.loose() {
+            self.set_loose(settings.loose);
+        }
+        match settings.rules.as_deref() {
+            Some(rules) if self.rules() != Some(rules) => self.set_rules(rules.clone()),
+            _ => Ok(()),
+        }
     }
 
     /// Replaces a terrain: takes over its queue, engine, limits and undo budget. Queued edits obey the rules

@@ -7,6 +7,7 @@
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
+use bevy::window::ExitSystems;
 //! # use bevy_burrow::prelude::*;
 //! use bevy_burrow::net::{Server, ServerSettings};
 //! use bevy_burrow::together::{GroundServer, SharedTerrain, TogetherPlugin};
@@ -107,6 +108,7 @@ impl Plugin for TogetherPlugin {
                 Last,
                 (client::send_last, server::finish_at_exit)
                     .chain()
+                    .after(ExitSystems)
                     .run_if(on_message::<AppExit>)
                     .run_if(resource_exists::<GroundServer>),
             );

@@ -192,3 +192,14 @@ fn an_app_that_exits_leaves_an_edit_to_its_next_start() {
     stage.frame();
     assert_eq!(stage.hash(terrain), hash);
 }
+
+/// Bevy ends the app at the end of the frame, when its window is closed.
+#[test]
+fn an_app_whose_window_closes_leaves_an_edit_to_its_next_start() {
+    let (mut stage, terrain) = stage(true);
+    let hash = stage.hash(terrain);
+    stage.app.world_mut().spawn(bevy::window::ClosingWindow);
+    stage.send(dig(30.0, 8.0, 30.0, 4.0));
+    stage.frame();
+    assert_eq!(stage.hash(terrain), hash);
+}

@@ -240,6 +240,33 @@ fn a_save_begins_as_a_level_and_goes_on_as_itself() {
 }
 
 #[test]
+fn rules_that_the_game_has_set_hold_in_a_level_without_any() {
+    let folder = Folder::new("rules-of-level");
+    let (level, pit) = level();
+    let rules = DiggingRules::default().with_bedrock(-20);
+    let loose = LooseSettings { crumbs: 7, ..LooseSettings::default() };
+    // The second time, the save begins without them.
+    for sets_rules in [true, false] {
+        let (mut app, entity) = app(&folder.0);
+        app.insert_resource(Assets::<BurrowLevel>::default());
+        let asset = BurrowLevel::new(&level).expect("it can be written");
+        let handle = app.world_mut().resource_mut::<Assets<BurrowLevel>>().add(asset);
+        let mut terrain = app.world_mut().get_mut::<Terrain>(entity).expect("it is there");
+        if sets_rules {
+            terrain.set_rules(rules.clone()).expect("valid rules");
+            terrain.set_loose(Some(loose));
+        }
+        app.world_mut().entity_mut(entity).insert(StartLevel(handle));
+        run_until_opened(&mut app);
+        let found = app.world().get::<Terrain>(entity).expect("it is there");
+        assert_eq!((found.rules(), found.loose()), (Some(&rules), Some(&loose)), "{sets_rules}");
+        assert_eq!(found.world().hash(), pit);
+        app.world_mut().write_message(AppExit::Success);
+        app.update();
+    }
+}
+
+#[test]
 fn a_folder_of_a_level_changes_only_where_the_level_does() {
     let folder = Folder::new("level-folder");
     let (level, expected) = level();

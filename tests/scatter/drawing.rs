@@ -94,4 +94,9 @@ fn plants_are_drawn_and_gone_with_their_ground() {
     app.update();
     let again = red(&capture::capture(&mut app, &film, TIMEOUT).expect("a picture"));
     assert!((again[0] - before[0]).abs() < 0.02, "{before:?}, then {again:?}");
+    // Nor is anything drawn without ground.
+    assert!(app.world_mut().entity_mut(terrain).take::<Terrain>().is_some());
+    (0..3).for_each(|_| app.update());
+    let gone = red(&capture::capture(&mut app, &film, TIMEOUT).expect("a picture"));
+    assert_eq!(gone, [0.0; 2]);
 }
