@@ -192,7 +192,7 @@ impl Brush {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn road(corridor: Corridor, shoulder: f32) -> Self {
-        // A shoulder that is no number is refused as a falloff.
+        // A shoulder that is not a number is refused as a falloff.
         let path = corridor.path.widened(if shoulder > 0.0 { shoulder } else { 0.0 });
         Self::new(Corridor { path, ..corridor }, Operation::Road).with_falloff(shoulder)
     }
@@ -292,7 +292,7 @@ impl Brush {
     pub(crate) fn placed_in_stretched(&self, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Self {
         let scale = matrix.determinant().abs().cbrt();
         let (back, by) = (rotation.inverse(), scale.recip());
-        // The space in between is no terrain's: nothing is rounded there.
+        // The space in between does not belong to a terrain: nothing is rounded there.
         let mut brush = self.moved(back, Shift::by(back * -translation * by), by);
         // The rest of the transform into the terrain.
         let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;

@@ -116,8 +116,7 @@ pub(crate) const EDIT_WORK: u64 = 20;
 /// How many times as much work a brick is for an edit that sculpts: it reads a stencil around each sample.
 const SCULPTED: u64 = 4;
 
-/// The work of an edit, in bricks: what queues limit, and what servers charge. `None` for an edit that reaches nothing of the
-/// world.
+/// The work of an edit, in bricks: what queues limit, and what servers charge. `None` for an edit outside the world.
 pub(crate) fn edit_work(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let weight = if edit.kind() == Kind::Sculpt { SCULPTED } else { 1 };
     Some(EDIT_WORK + weight * max_bricks(grid, edit)?)

@@ -214,7 +214,7 @@ pub(crate) fn read_within(
 /// needed.
 ///
 /// # Errors
-/// When it is no portable file, or when its head is damaged.
+/// When it is not a portable file, or when its head is damaged.
 pub fn read_portable_head(file: &[u8]) -> Result<(WorldId, PortableHead), FormatError> {
     let (world, own) = container::read_own(Kind::Portable, file, Limits::FORMAT.head)?;
     Ok((world, portable_head(&own)?))

@@ -1,12 +1,12 @@
 //! Loose pieces: ground that digging cut off from the world.
 //!
 //! **Connected** are solid samples that are neighbours along an axis, six for each sample. The surface connects the same
-//! ones: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples, and separates
+//! ones: its case table (`surface::cases`) puts no vertex on an edge between two solid samples, and separates
 //! solid corners that only meet across a diagonal. So two samples belong to one piece of ground exactly if a path
 //! inside the drawn surface connects them.
 //!
 //! **Anchored** is a piece that reaches ground below everything that was ever edited. The world's sides anchor
-//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further. Its
+//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further. The
 //! result does not depend on the order of the search.
 //!
 //! **Budget.** The search after an edit visits a bounded number of bricks, and what it finds has a bounded number of voxels:

@@ -14,12 +14,12 @@ use crate::volume::{MaterialCounts, SampleView};
 /// What happened to a loose piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PieceFate {
-    /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`](crate::volume::DiggingRules)
+    /// The piece stays where it is. So does every piece of which the terrain's [`DiggingRules`](crate::volume::DiggingRules)
     /// protect a part.
     Left,
-    /// It was taken out of the ground.
+    /// The piece was taken out of the ground.
     Removed,
-    /// It was taken out of the ground, and its mesh is there to make a body of.
+    /// The piece was taken out of the ground, and its mesh is there to make a body of.
     BrokeOff,
 }
 

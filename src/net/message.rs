@@ -356,10 +356,10 @@ pub enum Refusal {
     /// The client's cost bucket is empty.
     #[error("too much at once")]
     Cost,
-    /// The game forbids it.
+    /// The game forbids the edit.
     #[error("not allowed")]
     Forbidden,
-    /// It lies outside the world.
+    /// The edit lies outside the world.
     #[error("outside the world")]
     OutsideWorld,
     /// The server has too much to do.
@@ -371,7 +371,7 @@ pub enum Refusal {
     /// Other players have changed the same parts since.
     #[error("others have dug there since")]
     Touched,
-    /// It is larger than edits may be, or than a message may be.
+    /// The edit is larger than edits may be, or than a message may be.
     #[error("too large")]
     TooLarge,
     /// The edit arrived before the client had joined.
@@ -386,25 +386,25 @@ pub enum Refusal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum KickReason {
-    /// It speaks another [`PROTOCOL`].
+    /// The client speaks another [`PROTOCOL`].
     #[error("client and server have different versions of the protocol")]
     Protocol,
-    /// It has another [`SIMULATION`](crate::terrain::SIMULATION).
+    /// The client has another [`SIMULATION`](crate::terrain::SIMULATION).
     #[error("client and server have different versions of the simulation")]
     Simulation,
-    /// It has another ground.
+    /// The client has another ground.
     #[error("client and server have different grounds")]
     Ground,
-    /// It has another chunk size.
+    /// The client has another chunk size.
     #[error("client and server have different chunk sizes")]
     ChunkSize,
-    /// It sent too many invalid messages.
+    /// The client sent too many invalid messages.
     #[error("too many invalid messages")]
     Malformed,
-    /// It sent far more than its budget.
+    /// The client sent far more than its budget.
     #[error("flooding")]
     Flood,
-    /// The game removed it.
+    /// The game removed the client.
     #[error("kicked")]
     ByGame,
     /// The player has connected again, and plays over the new connection.

@@ -73,7 +73,7 @@ fn edit(rng: &mut Rng, image: &Arc<GreyImage>, [x, y]: EditPlaces) -> Edit {
     Edit::quantize(&brush.with_power(rng.u8(100..=255))).expect("a valid brush")
 }
 
-/// Something that is no client's edit.
+/// An entry that is not a client's edit.
 fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
     match rng.u32(0..4) {
         0 => {

@@ -142,7 +142,7 @@ impl Neighbourhood {
     }
 
     /// Whether both share the same areas.
-    pub fn is(&self, other: &Self) -> bool {
+    pub fn is_same(&self, other: &Self) -> bool {
         let is_in_other =
             |(terrain, area): (_, &Arc<Area>)| other.0.get(terrain).is_some_and(|own| Arc::ptr_eq(own, area));
         self.0.len() == other.0.len() && self.0.iter().all(is_in_other)
@@ -240,7 +240,7 @@ mod tests {
             Neighbourhood([(Entity::PLACEHOLDER, Arc::new(area))].into_iter().collect())
         });
         after.changes(&before, |column| panic!("{column:?} was near before"));
-        assert!(!after.is(&before), "the nearest is another one");
+        assert!(!after.is_same(&before), "the nearest is another one");
 
         assert_eq!(at(81.0, 20.0).len(), 1 + 13, "for each chunk's width of the way");
         assert_ne!(at(81.0, 20.0), at(82.0, 20.0));
@@ -253,15 +253,15 @@ mod tests {
             let area = Area::new(grid, stops(grid, Vec2::new(x, 50.0), Vec2::ZERO, 20.0));
             Neighbourhood([(Entity::PLACEHOLDER, Arc::new(area))].into_iter().collect())
         });
-        let mut told = std::collections::BTreeSet::new();
+        let mut reported = std::collections::BTreeSet::new();
         there.changes(&here, |(_, column)| {
-            told.insert(column);
+            reported.insert(column);
         });
         let is_near = |area: &Neighbourhood, column: TilePos| {
             area.distance((Entity::PLACEHOLDER, column)).is_some_and(|distance| distance <= 0.0)
         };
         for column in grid.tiles().filter(|&column| is_near(&here, column) != is_near(&there, column)) {
-            assert!(told.contains(&column), "{column:?}");
+            assert!(reported.contains(&column), "{column:?}");
         }
     }
 }

@@ -344,7 +344,7 @@ mod tests {
         assert_eq!((within.len(), border.len()), (64, 64));
         for (face, beyond) in within.into_iter().chain(border) {
             let slope = Vector::new(PITCH as f32 * face.x.signum(), 1.0, 0.0).normalize();
-            assert!(face.abs_diff_eq(slope, 1e-5), "{face} is no slope of the roof");
+            assert!(face.abs_diff_eq(slope, 1e-5), "{face} is not a slope of the roof");
             let other = Vector::new(-slope.x, slope.y, 0.0);
             assert!(beyond.abs_diff_eq(other, 1e-5), "{beyond} next to {face}");
         }

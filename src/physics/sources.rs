@@ -77,7 +77,7 @@ pub(super) fn find_near(
         }
         near.insert(terrain, grid, all, &known);
     }
-    if !near.is(&known) {
+    if !near.is_same(&known) {
         colliders.set_near(near.clone());
         let with_lod = terrains.iter().filter(|(.., has_lod)| *has_lod);
         wanted.0 = with_lod.map(|(terrain, ..)| (terrain, near.tiles(terrain).collect())).collect();

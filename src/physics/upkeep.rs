@@ -118,7 +118,7 @@ pub(super) fn update(
     let start = Instant::now();
     let near = colliders.near();
     let mut touched = columns.take_touched(&parts);
-    if !near.is(&known) {
+    if !near.is_same(&known) {
         near.changes(&known, |column| touched.extend([column]));
         *known = near;
     }

@@ -106,7 +106,7 @@ pub enum GroundFileError {
     )]
     NoPlace(String),
     /// The path of a file is invalid.
-    #[error("`{0}` is no path of a file: {1}")]
+    #[error("`{0}` is not a valid file path: {1}")]
     Path(String, ParseAssetPathError),
     /// A file can't be read.
     #[error("reading `{0}`: {1}")]
@@ -337,7 +337,7 @@ fn follow_ground_files(
                     tell(Ok(report.clone()));
                 }
                 Err(error) => {
-                    error!("no terrain is made of the ground of {entity}: {error}");
+                    error!("no terrain can be made from the ground of {entity}: {error}");
                     failed.insert(entity, hash);
                     tell(Err(error.to_string()));
                 }

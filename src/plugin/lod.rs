@@ -228,7 +228,7 @@ pub(super) fn begin_lod_changes(
         let chosen = eyes.clone();
         let choose: Arc<ChooseCut> =
             Arc::new(move |world, cut| known.next_cut(world, cut, &choice, &chosen, most));
-        // For the game this is no change.
+        // The game does not see this as a change.
         let Some(transaction) = terrain.bypass_change_detection().begin_cut_for(choose, true) else {
             continue;
         };

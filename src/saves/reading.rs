@@ -177,7 +177,7 @@ impl WorldReader {
         if let Some(rules) = rules.as_deref().filter(|rules| terrain.rules() != Some(rules))
             && let Err(why) = terrain.set_rules(rules.clone())
         {
-            error!("the rules of the terrain do not hold for its saved world: {why}");
+            error!("the terrain's rules could not be applied to its saved world: {why}");
         }
         if loose.is_some() && loose.as_ref() != terrain.loose() {
             terrain.set_loose(*loose);

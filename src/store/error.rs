@@ -59,7 +59,9 @@ pub enum StoreError {
         regions: usize,
     },
     /// The world is based on a level that was not given. Nothing is lost.
-    #[error("the world was begun on the level `{label}`, without which it can't be opened: give that level")]
+    #[error(
+        "the world was created from the level `{label}`, without which it can't be opened: give that level"
+    )]
     LevelMissing {
         /// What the game called the level.
         label: String,
@@ -67,7 +69,7 @@ pub enum StoreError {
     /// The world is based on another level than the given one, or the level has changed since, and
     /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) is set. Nothing is lost.
     #[error(
-        "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}: give that \
+        "the world was created from the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}: give that \
          level, or allow `base_changed`, which moves the world"
     )]
     LevelChanged {
@@ -107,7 +109,7 @@ pub enum StoreError {
     #[error("the log does not reach back to the first commit, so the world can't be made of it alone")]
     LogNotWhole,
     /// The log does not lead to the world that it describes.
-    #[error("the log can't be replayed: {0}")]
+    #[error("replaying the log does not give the saved world: {0}")]
     LogRefused(String),
     /// Records do not follow those that were taken before.
     #[error("records are missing: the next one leads to revision {found}, and the store is at {at}")]
@@ -187,7 +189,7 @@ impl StoreError {
 #[non_exhaustive]
 pub enum StoreWarning {
     /// The world can't be saved at present. Everything is kept in memory, and saving is retried.
-    #[error("saving fails, and is retried: {0}")]
+    #[error("saving failed and will be retried: {0}")]
     NotSaved(String),
     /// Saving works again.
     #[error("saving works again")]

@@ -69,7 +69,7 @@ impl Pending {
         let why = |why: String| FormatError::File { name: PENDING.into(), why };
         let pending: Self = serde_json::from_slice(&bytes).map_err(|error| why(error.to_string()))?;
         match pending.changed.iter().chain(&pending.removed).find(|name| !is_of_level(name)) {
-            Some(name) => Err(why(format!("`{name}` is none of a level's files")).into()),
+            Some(name) => Err(why(format!("`{name}` is not a file of a level")).into()),
             None => Ok(Some(pending)),
         }
     }

@@ -11,7 +11,7 @@ pub(crate) struct PackedVertices<'a> {
     pub origin: IVec3,
     /// Position in 1/4096 voxel; the fourth number is unused.
     pub positions: &'a [[u16; 4]],
-    /// As many.
+    /// Normals, one per position.
     pub normals: &'a [[f32; 3]],
     pub mixes: PackedMixes<'a>,
 }

@@ -297,7 +297,7 @@ mod tests {
         // Vertices that no triangle has count nothing.
         assert_eq!([found.triangles, found.vertices, found.edges], [4, 4, 6]);
         assert_eq!((found.euler, found.worst_normal_at), (2, None));
-        assert!(!report(&[]).is_closed(), "nothing is no surface");
+        assert!(!report(&[]).is_closed(), "an empty list is not a surface");
     }
 
     #[test]

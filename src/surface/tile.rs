@@ -203,9 +203,9 @@ struct Drawing<'a> {
 /// The vertices of a cell's side, which two cells of a patch share: numbered one after the other, up or down.
 #[derive(Clone, Copy, Default)]
 struct Side {
-    /// The number of the first one.
+    /// The number of the side's first vertex.
     number: u32,
-    /// And the level that it lies on.
+    /// The y of the level that the side lies on.
     y: i32,
 }
 

@@ -23,7 +23,7 @@ pub enum Order {
     /// Undoes the last group of edits that changed the world. Groups are decided when edits are submitted, not when
     /// their transactions begin: brushes of one [stroke](crate::brush::Brush::stroke) that follow each other, those
     /// that one call of [`apply`](super::Terrain::apply) or [`submit_all`](super::Terrain::submit_all) was given, or
-    /// a single brush. One that changed nothing is no step.
+    /// a single brush. A group that changed nothing is not a step.
     ///
     /// Afterwards everything equals the state before that group, bit by bit: [`World::hash`](super::World::hash),
     /// samples, materials, fields with their names, boxes and revisions, mask, meshes and rings. The exceptions are

@@ -55,7 +55,7 @@ impl Terrain {
         }
     }
 
-    /// The work of an order, if there is room for it. Rules and settings of loose pieces are not queued, and are none.
+    /// The work of an order, if there is room for it. Rules and settings of loose pieces are not queued, and cost nothing.
     ///
     /// # Errors
     /// When there is no room.

@@ -23,7 +23,7 @@ pub enum GlbError {
         /// Bytes of its buffer.
         bytes: u64,
     },
-    /// The voxel size is not a positive number, or so large that positions in metres are no finite numbers.
+    /// The voxel size is not a positive number, or so large that positions in metres are not finite.
     #[error("the voxel size is {0}, but it must be a positive number with which all positions are finite")]
     VoxelSize(f32),
     /// A vertex has no finite position or normal, so that other programs would refuse the file.

@@ -102,7 +102,7 @@ fn strike(timbre: Timbre, seconds: f32, seed: u64) -> Vec<f32> {
     let Timbre { cutoff, decay, tone: (pitch, share) } = timbre;
     let noise = noise(seconds, seed, |_| cutoff);
     let strike = times(seconds).zip(noise).map(|(time, noise)| {
-        // Two partials that are no multiples of each other: a stone, not a flute.
+        // Two partials that are not multiples of each other: a stone, not a flute.
         let tone = (TAU * pitch * time).sin() + 0.5 * (TAU * 2.76 * pitch * time).sin();
         let start = (time / 0.002).min(1.0);
         start * ((1.0 - share) * noise * (-time / decay).exp() + share * tone * (-time / (1.6 * decay)).exp())

@@ -156,11 +156,11 @@ pub enum ImportError {
         value: f32,
     },
     /// A material map is not a PNG file.
-    #[error("this is no PNG file: export splat maps and id maps as PNG, without loss")]
+    #[error("this is not a PNG file: export splat maps and id maps as PNG, without loss")]
     MapFormat,
     /// A splat map has a palette.
     #[error(
-        "the splat map has a palette, whose entries are no weights: export it with colours, or read it as an id map"
+        "the splat map has a palette, whose entries are not weights: export it with colours, or read it as an id map"
     )]
     MapPalette,
     /// Splat maps have several sizes.
@@ -213,7 +213,7 @@ pub enum ImportError {
         /// The maximum number of layers.
         most: usize,
     },
-    /// The distance between samples is no whole number of voxels.
+    /// The distance between samples is not a whole number of voxels.
     #[error(
         "samples that are {spacing} apart do not fit voxels of {voxel_size}: choose a voxel size that goes into the \
          distance 1 to 64 times, and project files in degrees to metres first"

@@ -110,7 +110,7 @@ impl fmt::Display for MaterialNote {
             Self::AlphaIgnored { file } => write!(f, "the alpha channel of file {file} was ignored"),
             Self::LooksOpaque { file } => write!(
                 f,
-                "the alpha channel of file {file} is full everywhere: if it is no layer, name `None` for it"
+                "the alpha channel of file {file} is full everywhere: if it is not a layer, name `None` for it"
             ),
             Self::NoWeight { count, x, z } => {
                 write!(f, "{count} samples have no weight, first ({x}, {z}): they got the first layer")
@@ -176,7 +176,7 @@ impl Pixels {
     }
 }
 
-/// The weights of a file: its channels without those that are no weights.
+/// The weights of a file: its channels without those that are not weights.
 struct Weights {
     pixels: Pixels,
     channels: usize,

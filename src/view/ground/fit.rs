@@ -24,7 +24,9 @@ pub enum GroundTexturesError {
         source: Arc<AssetLoadError>,
     },
     /// An image is not an array of layers, but for example an ordinary picture.
-    #[error("the {image} is no array of layers but {view:?}: GroundArrays makes arrays of ordinary pictures")]
+    #[error(
+        "the {image} is not a texture array but {view:?}: GroundArrays makes arrays of ordinary pictures"
+    )]
     NoArray {
         /// `albedo` or `relief`.
         image: &'static str,

@@ -34,7 +34,7 @@ pub enum GroundTextures {
     /// samplers that repeat. [`GroundArrays`](super::GroundArrays) makes them of ordinary pictures;
     /// a warning is logged if arrays differ, or have fewer layers than a look names.
     ///
-    /// Images that can't be loaded, or are no arrays that can be filtered, are not used: see [`GroundLoading::failure`].
+    /// Images that can't be loaded, or are not arrays that can be filtered, are not used: see [`GroundLoading::failure`].
     ///
     /// A software renderer goes without anisotropic filtering, which would take it minutes for each frame: where one of
     /// the samplers has it, or is the app's default one, both arrays are read with one that repeats and is linear.

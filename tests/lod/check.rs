@@ -1,4 +1,4 @@
-//! What a cut draws, as triangles in the world, and what is wrong with them.
+//! Draws a cut and counts its faults.
 
 use std::collections::BTreeMap;
 
