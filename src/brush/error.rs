@@ -98,7 +98,7 @@ pub enum BrushError {
     NoDirection {
         /// The field.
         what: &'static str,
-        /// Its length.
+        /// The length of the direction.
         length: f32,
     },
     /// The image of a stamp has too few or too many samples along a side.
@@ -128,7 +128,7 @@ pub enum BrushError {
         "the path has {count} points, but it must have {least} to {most}: divide a longer one into brushes of one stroke"
     )]
     PathPoints {
-        /// Its points.
+        /// Points of the path.
         count: usize,
         /// The minimum number of points.
         least: usize,

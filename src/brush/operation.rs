@@ -50,7 +50,7 @@ pub enum Operation {
     },
     /// Makes the surface level.
     Level {
-        /// Its height in voxels.
+        /// The height of the level surface, in voxels.
         height: f32,
     },
     /// Moves the surface outwards, which is up on pristine ground. Where a dig or an add was, distances are known

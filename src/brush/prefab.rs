@@ -110,12 +110,12 @@ pub struct Prefab {
     size: IVec3,
     anchor: IVec3,
     above_ground: i32,
-    /// Of each sample, x fastest, then z, then y.
+    /// Densities of all samples, x fastest, then z, then y.
     densities: Vec<i16>,
     materials: Vec<MaterialId>,
     marks: Vec<u8>,
     hash: u64,
-    /// Its file, made when it is first needed.
+    /// The prefab as a file, made when it is first needed.
     packed: OnceLock<Arc<[u8]>>,
 }
 

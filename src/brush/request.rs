@@ -43,7 +43,7 @@ use crate::ground::MaterialId;
     reflect(opaque, Clone, Debug, PartialEq, Serialize, Deserialize)
 )]
 pub struct Brush {
-    /// Where. With a custom shape it is not used; constructors and [`transformed`](Self::transformed) set it to a box
+    /// Where the brush works. With a custom shape it is not used; constructors and [`transformed`](Self::transformed) set it to a box
     /// around that one.
     pub shape: Shape,
     /// A shape that takes the place of `shape`: a path, for example.

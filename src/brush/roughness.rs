@@ -118,7 +118,7 @@ impl QuantizedRoughness {
         })
     }
 
-    /// As a brush has it.
+    /// Returns the roughness as a brush has it.
     pub(super) fn roughness(&self) -> Roughness {
         let origin = Vec3::from_array(self.origin.map(voxels));
         Roughness::new(voxels(self.amplitude), voxels(self.scale), self.seed).with_origin(origin)

@@ -25,12 +25,12 @@ pub(super) fn margin(horizon: i32) -> i32 {
 
 /// The distance of a brick's samples to the surface of the ground, in 1/256 voxel, up to a horizon.
 pub(super) struct SurfaceDistance {
-    /// Of the brick's samples, in the order of bricks.
+    /// Distances of the brick's samples, in the order of bricks.
     distances: Vec<i32>,
 }
 
 impl SurfaceDistance {
-    /// Those of a brick. Beyond the world's rim, everything continues as at the rim.
+    /// Computes the distances of a brick's samples. Beyond the world's rim, everything continues as at the rim.
     pub fn new(view: &SampleView, pos: BrickPos, horizon: i32) -> Self {
         let around = pos.samples().grown(margin(horizon));
         let all = densities(view, around);

@@ -44,7 +44,7 @@ impl Batch {
         self.commits.is_empty() && self.game.is_empty()
     }
 
-    /// Its bytes, with the content of edits in each of them. A batch with a commit that sets
+    /// Encodes the batch, with the content of edits in each of them. A batch with a commit that sets
     /// another [ground](Order::Ground) is refused when it is read: a log ends there.
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -126,7 +126,7 @@ impl Batch {
 /// With names in place of content, as journals have it.
 #[cfg(feature = "store")]
 impl Batch {
-    /// Its bytes like those of [`encode`](Self::encode), but with names in the place of content: all names come first,
+    /// Encodes the batch like [`encode`](Self::encode), but with names in the place of content: all names come first,
     /// where [`names`](Self::names) finds them.
     pub(crate) fn encode_named(&self) -> Vec<u8> {
         let mut bytes = Vec::new();

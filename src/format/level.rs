@@ -68,7 +68,7 @@ impl Level {
         Self { settings, ground: ground.hash(), next_field, edit_settings, game, regions }
     }
 
-    /// Its parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
+    /// The level's parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
     pub fn parts(&self) -> WorldParts {
         let change = of_regions(&self.regions, self.next_field);
         let (chunk_size, edit_settings) = (self.settings.chunk_size, self.edit_settings.clone());

@@ -143,7 +143,7 @@ pub enum ImageError {
         unit: &'static str,
         /// How many the dimensions ask for.
         expected: u64,
-        /// Their number.
+        /// The number of bytes or samples that were given.
         actual: u64,
     },
     /// The file is not a PNG, is damaged, or uses something that the decoder does not know.

@@ -99,7 +99,7 @@ impl Viewpoint {
 /// The properties of a node that a choice depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeFacts {
-    /// Its lowest and its highest point, in voxels.
+    /// The node's lowest and highest point, in voxels.
     pub heights: [f32; 2],
     /// Greatest distance from the finer surface, in voxels.
     pub error: f32,

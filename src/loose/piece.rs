@@ -60,20 +60,20 @@ pub struct Run {
 #[serde(from = "Plain", into = "Plain")]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct LoosePiece {
-    /// Its id. A saved piece does not store it, because it follows from `runs` and `materials`.
+    /// The piece's id. A saved piece does not store it, because it follows from `runs` and `materials`.
     pub id: PieceId,
-    /// What happened to it.
+    /// What happened to the piece.
     pub fate: PieceFate,
-    /// Box around its samples.
+    /// Box around the piece's samples.
     pub bounds: LatticeBox,
-    /// How many samples it has.
+    /// Number of samples.
     pub voxels: u64,
-    /// Its voxels by material: times the density and volume of a voxel, its mass.
+    /// Voxels by material: multiplied by density and volume of a voxel, they give the mass.
     pub materials: MaterialCounts,
-    /// Its samples, by y, then z, then x.
+    /// The piece's samples, by y, then z, then x.
     pub runs: Arc<[Run]>,
-    /// Its surface as marching cubes draws it, closed, with positions counted from the lowest corner of `bounds`; for
-    /// those that broke off.
+    /// The closed surface, as marching cubes draws it, with positions counted from the lowest corner of `bounds`; only for
+    /// pieces that broke off.
     pub mesh: Option<Arc<SurfaceMesh>>,
 }
 
@@ -86,7 +86,7 @@ pub struct ReturnedPiece {
     pub tag: u64,
     /// What had happened to it then: [`PieceFate::Removed`] or [`PieceFate::BrokeOff`].
     pub fate: PieceFate,
-    /// Its voxels by material.
+    /// The piece's voxels by material.
     pub materials: MaterialCounts,
 }
 

@@ -69,7 +69,7 @@ pub enum WalkError {
     OutOfRange {
         /// The field of [`WalkSettings`].
         name: &'static str,
-        /// Its value.
+        /// The value of the field.
         value: f32,
         /// The least value.
         least: f32,

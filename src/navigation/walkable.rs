@@ -22,7 +22,7 @@ pub struct WalkableTile {
 /// A cell on which an agent can stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct WalkableCell {
-    /// Its lowest column.
+    /// The cell's lowest column.
     pub cell: Column,
     /// Heights of the ground at its [corners](Column::corners), in 1/256 voxel.
     pub heights: [i32; 4],
@@ -47,7 +47,7 @@ impl WalkableTile {
         self.pos
     }
 
-    /// Its walkable cells, row by row, those above each other from below.
+    /// The tile's walkable cells, row by row; cells above each other from the lowest up.
     pub fn cells(&self) -> impl Iterator<Item = WalkableCell> {
         self.columns().flat_map(|(cell, _)| self.cells_of(cell))
     }

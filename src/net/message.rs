@@ -117,7 +117,7 @@ impl Entry {
         if let Some(Order::Parts { change, .. }) = self.order() { Some(change) } else { None }
     }
 
-    /// Its sequence number at a client, if that client asked for it.
+    /// The entry's sequence number at a client, if that client sent it.
     pub(crate) fn number_of(&self, client: Option<ClientId>) -> Option<u64> {
         match self {
             Self::Order { by: Some((author, sequence)), .. } if Some(*author) == client => Some(*sequence),
@@ -131,7 +131,7 @@ impl Entry {
 pub struct Entries {
     /// The number of the first.
     pub first: u64,
-    /// All of them.
+    /// All of the entries.
     pub entries: Vec<Entry>,
 }
 
@@ -160,7 +160,7 @@ pub struct Hello {
     pub chunk_size: u32,
     /// The position that it has reached, if it has joined before.
     pub epoch: Option<Epoch>,
-    /// Where its player is, in voxels: regions come from there outwards.
+    /// Where the client's player is, in voxels: regions come from there outwards.
     pub position: IVec3,
 }
 
@@ -187,7 +187,7 @@ pub enum ToServer {
     },
     /// Undoes the last stroke of a client before this position among its edits.
     Undo {
-        /// Its sequence number among the client's edits and undos.
+        /// The undo's sequence number among the client's edits and undos.
         sequence: u64,
         /// The player whose stroke is undone.
         of: ClientId,
@@ -222,7 +222,7 @@ pub enum Join {
         /// The numbers of entries among them that the server could not apply: they do nothing.
         failed: Vec<u64>,
     },
-    /// All regions follow in the bulk lane. All others are pristine.
+    /// All stored regions follow in the bulk lane. All others are pristine.
     Regions {
         /// How many.
         regions: u32,
@@ -281,7 +281,7 @@ pub struct RegionContent {
     pub left: u32,
     /// The greatest name that a field has had.
     pub next_field: u64,
-    /// Its bricks.
+    /// The region's bricks.
     pub bricks: Vec<(BrickPos, Arc<Brick>)>,
     /// The fields of all chunks that have a sample in it; chunks that are not named have none.
     pub fields: Vec<(ChunkPos, Fields)>,
@@ -304,7 +304,7 @@ pub enum ToClient {
     },
     /// The server refused an edit or undo of the client.
     Refused {
-        /// Its sequence number.
+        /// The sequence number of the edit or undo.
         sequence: u64,
         /// Why.
         why: Refusal,

@@ -30,7 +30,7 @@ struct Reads {
     reach: LatticeBox,
     /// How far from those it reads, along each axis.
     around: IVec3,
-    /// Of an edit whose box is mostly empty, such as a long path.
+    /// The edit's evaluator, if its box is mostly empty, as that of a long path is.
     evaluator: Option<Evaluator>,
 }
 

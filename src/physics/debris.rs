@@ -68,9 +68,9 @@ pub struct Debris {
     pub id: PieceId,
     /// The tag of the brush that cut it off.
     pub tag: u64,
-    /// Its most common material.
+    /// The most common material of the piece.
     pub material: MaterialId,
-    /// Its size in voxels.
+    /// The size of the piece in voxels.
     pub voxels: u64,
     /// Half the sides of its bounds as it was in the ground, in metres.
     pub half: Vec3,

@@ -45,7 +45,7 @@ impl Default for EdgeWalls {
 #[derive(Component)]
 pub(super) struct EdgeWall;
 
-/// Those of disabled terrains too.
+/// All walls, including those of disabled terrains.
 type Walls<'w, 's> = Query<'w, 's, (Entity, &'static ChildOf), (With<EdgeWall>, Allow<Disabled>)>;
 
 type Terrains<'w, 's> =

@@ -90,7 +90,7 @@ fn apply_to_all(world: &mut World, terrain: Entity) {
 struct Applied(GroundContact);
 
 impl GroundContact {
-    /// That of a terrain's ground.
+    /// The contact of a terrain's ground.
     pub(super) fn of(world: &World, terrain: Entity) -> Self {
         let own = world.get::<TerrainContact>(terrain).map(|own| own.0.clone());
         own.unwrap_or_else(|| world.resource::<Self>().clone())

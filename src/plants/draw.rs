@@ -58,13 +58,13 @@ impl Plugin for PlantDrawingPlugin {
 pub struct PlantLook {
     /// The name of the species.
     pub species: String,
-    /// Its mesh in metres, with its foot at the origin, for plants of size 1. Positions and normals; colours and the first
+    /// The mesh in metres, with its foot at the origin, for plants of size 1. Positions and normals; colours and the first
     /// texture coordinates, if it has any.
     pub mesh: Handle<Mesh>,
     /// A simpler mesh for plants farther away than the species' [`detail`](crate::scatter::ViewDistances::detail). Without it,
     /// they are drawn with the same mesh up to the end.
     pub far: Option<Handle<Mesh>>,
-    /// Its material.
+    /// The material of the mesh.
     pub material: StandardMaterial,
     /// Metres by which the wind moves what is a metre above the ground.
     pub sway: f32,

@@ -166,7 +166,7 @@ pub struct PlantRemoved {
     pub terrain: Entity,
     /// The plant; its species is an index of the rules.
     pub plant: Plant,
-    /// Where it stood, in world space: its foot, how it is turned, and its size.
+    /// Where the plant stood, in world space: its foot, how it is turned, and its size.
     pub transform: Transform,
     /// Whether a game felled it, as with [`removal_of`]: its ground and the air around it are as they were. `false` if they were
     /// dug, built over or painted. See [`Scatter::is_felled`].
@@ -180,7 +180,7 @@ pub struct PlantReturned {
     pub terrain: Entity,
     /// The plant.
     pub plant: Plant,
-    /// Where it stands, in world space.
+    /// Where the plant stands, in world space.
     pub transform: Transform,
 }
 

@@ -34,7 +34,7 @@ const EDITS: u32 = 2;
 /// The height of a picture whose camera has none yet, in pixels.
 const HEIGHT: f32 = 1080.0;
 
-/// Its width.
+/// The width of such a picture, in pixels.
 const WIDTH: f32 = 1920.0;
 
 /// How a camera draws, in its own space and in metres.

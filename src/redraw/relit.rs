@@ -90,7 +90,7 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool +
 }
 
 impl Unchanged {
-    /// Those whose light differs.
+    /// The unchanged meshes whose light differs.
     fn relit(&self, world: &World, change: &mut LightChange) -> Vec<MeshKey> {
         let (mut found, tile) = (Vec::new(), self.tile);
         if self.is_tile_drawn {

@@ -99,7 +99,7 @@ pub(crate) struct ReadWorld {
 pub(super) enum Found {
     /// An existing world.
     Old(ReadWorld),
-    /// There was none, and it was made of the terrain.
+    /// A new world, created from the terrain.
     New(ReadWorld),
 }
 

@@ -24,9 +24,9 @@ pub struct PatchPos {
 /// A plant that disappeared or returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlantChange {
-    /// Its patch.
+    /// The plant's patch.
     pub patch: PatchPos,
-    /// Its index in the patch.
+    /// The plant's index in the patch.
     pub index: usize,
     /// The plant.
     pub plant: Plant,

@@ -31,7 +31,7 @@ pub struct ScatterRules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Species {
-    /// Its name, which seeds where its plants stand. Its place in the list matters only for [`room`](Self::room).
+    /// The name, which seeds where the plants stand. The species' place in the list matters only for [`room`](Self::room).
     pub name: String,
     /// Sides of the squares that have one spot each, 1/16 to 1024.
     pub spacing: f32,
@@ -111,9 +111,9 @@ pub struct Clearance {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stem {
-    /// Its radius, 1/256 to 16.
+    /// The stem's radius, 1/256 to 16.
     pub radius: f32,
-    /// Its height above the plant's foot, 1/256 to 256.
+    /// The stem's height above the plant's foot, 1/256 to 256.
     pub height: f32,
 }
 
@@ -146,7 +146,7 @@ pub enum ScatterError {
         species: String,
         /// The field.
         what: &'static str,
-        /// Its value.
+        /// The value of the field.
         value: f32,
         /// The range.
         allowed: &'static str,

@@ -8,13 +8,13 @@ use crate::lattice::{Column, ONE, ceil};
 /// A point where a plant may stand, with what is random about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Spot {
-    /// Its square.
+    /// The square that the spot lies in.
     pub square: (i32, i32),
     /// In 1/256 voxel.
     pub x: i32,
     /// In 1/256 voxel.
     pub z: i32,
-    /// Of two that are too near to each other, the greater one stays.
+    /// The priority: of two spots that are too near to each other, the one with the greater number stays.
     priority: u64,
     /// Two more random numbers, as bits.
     pub random: u64,
@@ -147,7 +147,7 @@ impl Spots {
         Self { spots, ..all }
     }
 
-    /// All of them, by square.
+    /// All spots, by square.
     pub fn iter(&self) -> impl Iterator<Item = &Spot> {
         self.spots.iter().flatten()
     }

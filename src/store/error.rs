@@ -86,7 +86,7 @@ pub enum StoreError {
     /// A part of a file takes more bytes than can be read, so it is neither read nor written.
     #[error("a part of the file takes {length} bytes, more than the {limit} that can be read")]
     TooLarge {
-        /// Its bytes.
+        /// Bytes of the part.
         length: u64,
         /// The most that can be read.
         limit: u64,
@@ -124,7 +124,7 @@ pub enum StoreError {
     OtherSize {
         /// The size of the saved world.
         saved: WorldSize,
-        /// That of the terrain.
+        /// The size of the terrain.
         given: WorldSize,
     },
     /// A server keeps the world of this terrain, and saves it.
@@ -223,7 +223,7 @@ pub enum StoreWarning {
         revision: u64,
         /// How much was left out.
         bytes: u64,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// Replaying the log does not give the hashes that it contains, so the rest of it was skipped.
@@ -233,7 +233,7 @@ pub enum StoreWarning {
         revision: u64,
         /// The mismatch.
         why: String,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// A damaged part was rebuilt, from the log or from other files; nothing is lost.
@@ -241,7 +241,7 @@ pub enum StoreWarning {
     Rebuilt {
         /// The damage, in words.
         what: String,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// A damaged region is lost: the ground there is in its first state.
@@ -252,7 +252,7 @@ pub enum StoreWarning {
     RegionLost {
         /// The region, as `x y z` in units of 64 voxels.
         region: String,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// The log is missing, with all commits that were in it only: the folder `journal` was removed after a crash.

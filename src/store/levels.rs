@@ -22,7 +22,7 @@ pub enum RestoreLevelError {
     /// A file is damaged, or does not belong to a level.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// It does not fit the ground, or its settings are out of range.
+    /// The level does not fit the ground, or its settings are out of range.
     #[error(transparent)]
     Restore(#[from] RestoreError),
 }

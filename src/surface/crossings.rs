@@ -33,7 +33,7 @@ pub(super) struct Edge {
 pub(super) struct Crossings {
     /// Along x, y and z.
     pub lists: [Vec<Edge>; 3],
-    /// Their solid ends, layer by layer; only where the ground's materials differ from voxel to voxel.
+    /// The solid ends of the edges, layer by layer; only where the ground's materials differ from voxel to voxel.
     pub ends: Option<[LayerBits; 9]>,
 }
 

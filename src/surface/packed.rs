@@ -26,7 +26,7 @@ pub(crate) enum PackedMixes<'a> {
 }
 
 impl<'a> PackedVertices<'a> {
-    /// Their number.
+    /// The number of vertices.
     pub fn len(self) -> usize {
         self.positions.len()
     }

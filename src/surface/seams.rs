@@ -51,7 +51,7 @@ pub struct SeamReport {
     pub euler: i64,
     /// Largest angle between the normals of vertices at one place, degrees.
     pub worst_normal_jump: f64,
-    /// Where that is, in voxels.
+    /// Where the largest angle is, in voxels.
     pub worst_normal_at: Option<DVec3>,
     /// A place, in voxels, for each kind of fault that was found.
     pub first: BTreeMap<SeamFault, DVec3>,

@@ -103,11 +103,11 @@ const ROOM: usize = 64;
 /// The rings of 8x8 cells of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Patch {
-    /// Where, as (z, x).
+    /// Where the patch is, as (z, x).
     at: (i32, i32),
-    /// Where its vertices end.
+    /// Where the patch's vertices end.
     vertices: usize,
-    /// Where its triangles end.
+    /// Where the patch's triangles end.
     fans: usize,
 }
 
@@ -167,7 +167,7 @@ impl Rings {
         &self.vertices
     }
 
-    /// Their triangles: the tile's columns count first, then these rings' own vertices.
+    /// The triangles of the rings: the tile's columns count first, then these rings' own vertices.
     pub(crate) fn fans(&self) -> &[u32] {
         &self.fans
     }

@@ -78,7 +78,7 @@ pub(crate) struct Reached {
 }
 
 impl Reached {
-    /// Those of a change.
+    /// The positions of a change.
     pub fn of(change: &Change) -> Self {
         Self {
             bricks: change.patch.bricks.iter().map(|own| (own.0, ())).collect(),

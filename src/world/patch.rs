@@ -256,7 +256,7 @@ impl Overlay {
         Over { above: self, below }
     }
 
-    /// Its content as a patch.
+    /// The overlay's content as a patch.
     pub fn patch(&self, next_field: u64) -> Patch {
         let bricks = self.bricks.iter().map(|(pos, brick)| (*pos, brick.clone()));
         let fields = self.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone()));

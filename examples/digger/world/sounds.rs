@@ -56,7 +56,7 @@ const TIMBRES: [Timbre; 12] = [
 ];
 
 impl Sound {
-    /// Its samples, mono, between -1 and 1. They start and end in silence, and are the same each time.
+    /// The sound's samples, mono, between -1 and 1. They start and end in silence, and are the same each time.
     pub fn samples(self) -> Vec<f32> {
         let of = |material: MaterialId| TIMBRES[usize::from(material.0).min(TIMBRES.len() - 1)];
         finished(match self {
@@ -70,7 +70,7 @@ impl Sound {
         })
     }
 
-    /// Its loudness relative to other sounds, from 0 to 1.
+    /// The sound's loudness relative to other sounds, from 0 to 1.
     pub const fn volume(self) -> f32 {
         match self {
             Self::Explosion => 1.0,

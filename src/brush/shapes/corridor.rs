@@ -76,7 +76,7 @@ impl QuantizedCorridor {
         })
     }
 
-    /// As a brush has it.
+    /// Returns the corridor as a brush has it.
     pub fn restored(&self) -> Corridor {
         Corridor { path: self.path.restored(), above: voxels(self.above), below: voxels(self.below) }
     }

@@ -109,7 +109,7 @@ impl QuantizedGrid {
         })
     }
 
-    /// As a brush has it.
+    /// Returns the grid as a brush has it.
     pub fn restored(&self) -> GridShape {
         GridShape {
             grid: self.samples.clone(),

@@ -58,7 +58,7 @@ pub enum ImportError {
         format: HeightFormat,
         /// Column of the first sample that is not grey.
         x: u32,
-        /// Its row.
+        /// Row of that sample.
         z: u32,
     },
     /// The file has channels of which none is known to hold heights.
@@ -137,7 +137,7 @@ pub enum ImportError {
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
     },
     /// There are outliers, which were to be refused.
@@ -150,9 +150,9 @@ pub enum ImportError {
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
-        /// Its value.
+        /// Value of the first one.
         value: f32,
     },
     /// A material map is not a PNG file.
@@ -171,9 +171,9 @@ pub enum ImportError {
     MapSize {
         /// The file's place in the list.
         file: usize,
-        /// Its samples in a row.
+        /// Samples in a row of the file.
         width: u32,
-        /// Its rows.
+        /// Rows of the file.
         height: u32,
         /// The size of the first one.
         first: (u32, u32),
@@ -186,7 +186,7 @@ pub enum ImportError {
     Layers {
         /// Channels that `SplatOptions::layers` names.
         named: usize,
-        /// Those of them with a material.
+        /// Named channels that have a material.
         layers: usize,
         /// Channels of all files.
         channels: usize,
@@ -200,7 +200,7 @@ pub enum ImportError {
         found: String,
         /// Column of the sample.
         x: u32,
-        /// Its row.
+        /// Row of the sample.
         z: u32,
     },
     /// A surface has more materials than splat maps have channels.

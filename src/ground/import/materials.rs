@@ -83,11 +83,11 @@ pub enum MaterialNote {
     },
     /// Samples without any weight got the first layer.
     NoWeight {
-        /// Their number.
+        /// Number of such samples.
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
     },
     /// A channel without a layer has weight.

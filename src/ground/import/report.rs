@@ -79,13 +79,13 @@ pub enum ImportNote {
     },
     /// Samples far from all around them were found.
     Outliers {
-        /// Their number.
+        /// Number of outliers.
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
-        /// Its value.
+        /// Value of the first one.
         value: f32,
     },
     /// All samples have the same value.

@@ -272,7 +272,7 @@ impl Client {
         self.replica.whole(shown)
     }
 
-    /// Its statistics.
+    /// The client's statistics.
     pub fn figures(&self) -> ClientFigures {
         let (drafts, drafted) = (self.replica.drafts(), self.replica.drafted());
         ClientFigures { drafts, drafted, ..self.figures }

@@ -19,9 +19,9 @@ enum Item {
 /// What it costs.
 #[derive(Clone, Copy)]
 struct Cost {
-    /// As soon as it arrives.
+    /// The cost as soon as the item arrives.
     known: u64,
-    /// At most.
+    /// The most that it can cost.
     most: u64,
 }
 

@@ -59,7 +59,7 @@ const KICKS: [KickReason; 8] = [
 const REFUSED_BY_GAME: u8 = 255;
 
 impl ToClient {
-    /// Its bytes.
+    /// Encodes the message.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut to = Vec::new();
         match self {

@@ -89,9 +89,9 @@ pub type Outgoing = (ClientId, Lane, Vec<u8>);
 /// An entry that was ordered and not yet applied.
 struct Ordered {
     entry: Entry,
-    /// Of an edit: the tag and the stroke that it had at its author's.
+    /// For an edit: its author's tag and stroke.
     labels: (u64, Option<u64>),
-    /// Of an edit.
+    /// For an edit: its cost.
     cost: u64,
 }
 
@@ -281,7 +281,7 @@ impl Server {
         }
     }
 
-    /// Its statistics.
+    /// The server's statistics.
     pub fn figures(&self) -> ServerFigures {
         self.figures
     }

@@ -162,7 +162,7 @@ mod tests {
     struct Line {
         /// In bytes a second.
         rate: u64,
-        /// There and back.
+        /// The time there and back.
         way: Duration,
         /// Lost packets of a hundred, and the time after which they are sent again.
         lost: u32,

@@ -19,7 +19,7 @@ pub(super) struct Builder {
     vertices: Vec<Vertex>,
     indices: Vec<Number>,
     places: FxHashMap<IVec3, Number>,
-    /// Of the columns.
+    /// Shares of the columns.
     shares: Shares,
     /// Which cells are split across, row by row; see [`splits_across`](Self::splits_across).
     splits: Vec<bool>,
@@ -36,7 +36,7 @@ pub(super) fn page_vertex(page: &GroundPage, number: usize, column: Column, low:
 }
 
 impl Builder {
-    /// With the columns of a node whose cells have this stride.
+    /// A builder that begins with the columns of a node whose cells have this stride.
     pub fn new(ground: &Ground, low: Column, high: Column, stride: i32) -> Self {
         let along =
             |low: i32, high: i32| (low..high).step_by(stride as usize).chain([high]).collect::<Vec<i32>>();

@@ -68,7 +68,7 @@ pub(super) struct FinerShares {
 }
 
 impl FinerShares {
-    /// Those of a node from `low` to `high`, with the strides of the nodes across its sides.
+    /// Computes the shares of a node from `low` to `high`, with the strides of the nodes across its sides.
     pub fn new(
         view: &LodView,
         low: Column,

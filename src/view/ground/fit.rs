@@ -30,7 +30,7 @@ pub enum GroundTexturesError {
     NoArray {
         /// `albedo` or `relief`.
         image: &'static str,
-        /// Its view dimension; the renderer needs [`TextureViewDimension::D2Array`].
+        /// The image's view dimension; the renderer needs [`TextureViewDimension::D2Array`].
         view: TextureViewDimension,
     },
     /// An image has texels that the GPU can't filter: integers, depths, on most GPUs also 32-bit floats.
@@ -38,7 +38,7 @@ pub enum GroundTexturesError {
     Format {
         /// `albedo` or `relief`.
         image: &'static str,
-        /// Its format.
+        /// The image's format.
         format: TextureFormat,
     },
     /// An image has several samples per texel.

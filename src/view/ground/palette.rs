@@ -16,7 +16,7 @@ pub(super) struct Point {
 
 /// How a layer is painted.
 pub(super) struct Recipe {
-    /// Its name, for logs.
+    /// The recipe's name, for logs.
     pub name: &'static str,
     /// Metres from height 0 to height 1, as wide as [`Recipe::metres`].
     pub relief: f32,
