@@ -84,8 +84,8 @@ impl PreparedEdit {
     }
 }
 
-/// How far from the samples that it changes an edit with this kernel, or one that rules restrict, reads others, in voxels
-/// along each axis.
+/// How far from the samples that it changes an edit with this kernel, or one that rules restrict, reads others, in
+/// voxels along each axis.
 fn reads_around(sculptor: Option<&SculptKernel>) -> IVec3 {
     let rounding = sculptor.and_then(SculptKernel::rounding);
     let around = rounding.map_or(1, |rounding| margin(rounding.horizon()));
@@ -104,8 +104,8 @@ pub(crate) fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
     edit.reach().intersection(grid.edit_bounds())
 }
 
-/// At least the number of bricks of a world that an edit may change: along paths far fewer than the bricks in its reach.
-/// `None` when it lies outside.
+/// At least the number of bricks of a world that an edit may change: along paths far fewer than the bricks in its
+/// reach. `None` when it lies outside.
 pub(crate) fn max_bricks(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let around = BrickPos::range(reach(grid, edit)?).volume();
     Some(edit.max_bricks().map_or(around, |most| most.min(around)))

@@ -32,7 +32,8 @@ const GROUND: u8 = 4;
 /// A sequence of commits, and the game's data up to the last of them.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Commits in order. A change is stored only with an entry [`LogEntry::Change`]; changes of edits are computed again.
+    /// Commits in order. A change is stored only with an entry [`LogEntry::Change`]; changes of edits are computed
+    /// again.
     pub commits: Vec<CommitRecord>,
     /// Changes of the game's data, in order; `None` if it removed a key.
     pub game: Vec<(String, Option<Vec<u8>>)>,

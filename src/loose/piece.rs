@@ -14,8 +14,8 @@ use crate::volume::{MaterialCounts, SampleView};
 /// What happened to a loose piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PieceFate {
-    /// The piece stays where it is. So does every piece of which the terrain's [`DiggingRules`](crate::volume::DiggingRules)
-    /// protect a part.
+    /// The piece stays where it is. So does every piece of which the terrain's
+    /// [`DiggingRules`](crate::volume::DiggingRules) protect a part.
     Left,
     /// The piece was taken out of the ground.
     Removed,
@@ -72,8 +72,8 @@ pub struct LoosePiece {
     pub materials: MaterialCounts,
     /// The piece's samples, by y, then z, then x.
     pub runs: Arc<[Run]>,
-    /// The closed surface, as marching cubes draws it, with positions counted from the lowest corner of `bounds`; only for
-    /// pieces that broke off.
+    /// The closed surface, as marching cubes draws it, with positions counted from the lowest corner of `bounds`; only
+    /// for pieces that broke off.
     pub mesh: Option<Arc<SurfaceMesh>>,
 }
 

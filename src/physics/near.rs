@@ -13,7 +13,8 @@ use crate::plugin::squares_within;
 /// The most stops on a way ahead, one for each chunk's width.
 const STOPS: u32 = 64;
 
-/// The shortest side of a voxel in world space, in metres: where parents stretch a terrain, colliders must not fall short.
+/// The shortest side of a voxel in world space, in metres: where parents stretch a terrain, colliders must not fall
+/// short.
 pub(super) fn shortest_side(place: &GlobalTransform) -> f32 {
     place.scale().abs().min_element()
 }
@@ -67,12 +68,12 @@ fn relevant(grid: ChunkGrid, mut stops: Vec<Stop>) -> Vec<Stop> {
     stops
 }
 
-/// The stops of a source at `from` that moves along `way`: one at its place, and one for each chunk's width ahead. All in
-/// voxels.
+/// The stops of a source at `from` that moves along `way`: one at its place, and one for each chunk's width ahead. All
+/// in voxels.
 pub(super) fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
     let stride = grid.size() as f32;
-    // Rounded, so that small moves change nothing. A source that covers the whole grid is rounded to its column: it only
-    // decides which colliders are built first.
+    // Rounded, so that small moves change nothing. A source that covers the whole grid is rounded to its column: it
+    // only decides which colliders are built first.
     let home = (from / stride).floor() * stride + stride / 2.0;
     if reaches_all(grid, (home, radius + 1.0)) {
         return vec![(home.clamp(Vec2::ZERO, end(grid)), end(grid).length() + 1.0)];
@@ -91,8 +92,8 @@ struct Area {
     stops: Vec<Stop>,
     /// Whether one stop covers the whole grid.
     is_all: bool,
-    /// The distance from each column to the nearest disc, in voxels; negative inside. Columns farther away than a chunk's
-    /// width are left out.
+    /// The distance from each column to the nearest disc, in voxels; negative inside. Columns farther away than a
+    /// chunk's width are left out.
     columns: FxHashMap<TilePos, f32>,
 }
 

@@ -17,7 +17,8 @@ use crate::terrain::Terrain;
 /// How far ahead of a moving source colliders are made, in seconds.
 const AHEAD: f32 = 1.0;
 
-/// About how many bytes colliders take for each cell (x, z): two triangles, with their share of vertices and of the tree.
+/// About how many bytes colliders take for each cell (x, z): two triangles, with their share of vertices and of the
+/// tree.
 const CELL_BYTES: f32 = 186.0;
 
 /// A source that wants colliders of more bytes than this is warned of.

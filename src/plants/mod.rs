@@ -47,7 +47,8 @@ use crate::terrain::Version;
 #[derive(Default)]
 pub struct PlantsPlugin;
 
-/// The system that follows commits, in [`BurrowSystems::Commit`] and, for commits in the frame of the click, in `PostUpdate`.
+/// The system that follows commits, in [`BurrowSystems::Commit`] and, for commits in the frame of the click, in
+/// `PostUpdate`.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PlantSystems;
 
@@ -96,7 +97,8 @@ pub struct PlantSource {
     pub radius: f32,
 }
 
-/// The plants of a terrain that are loaded: around cameras, as far as their species is drawn, and around [`PlantSource`]s.
+/// The plants of a terrain that are loaded: around cameras, as far as their species is drawn, and around
+/// [`PlantSource`]s.
 #[derive(Component, Debug, Default)]
 pub struct ShownPlants {
     /// `None` until rules without an error were read.
@@ -168,8 +170,8 @@ pub struct PlantRemoved {
     pub plant: Plant,
     /// Where the plant stood, in world space: its foot, how it is turned, and its size.
     pub transform: Transform,
-    /// Whether a game felled it, as with [`removal_of`]: its ground and the air around it are as they were. `false` if they were
-    /// dug, built over or painted. See [`Scatter::is_felled`].
+    /// Whether a game felled it, as with [`removal_of`]: its ground and the air around it are as they were. `false` if
+    /// they were dug, built over or painted. See [`Scatter::is_felled`].
     pub is_felled: bool,
 }
 

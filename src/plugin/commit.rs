@@ -220,8 +220,9 @@ pub(super) fn commit_begun(
     }
 }
 
-/// Commits one task's output, and returns whether it did. A transaction that the game abandoned is refused; its edits wait
-/// in the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
+/// Commits one task's output, and returns whether it did. A transaction that the game abandoned is refused; its edits
+/// wait in the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a
+/// rejection.
 fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,

@@ -45,7 +45,8 @@ pub struct GroundDescription {
     pub import: ImportOptions,
     /// How tiles meet.
     pub tiles: TileEdges,
-    /// The scale. `None`: voxels of one metre, and samples as far apart as the first file says, or a voxel if it says nothing.
+    /// The scale. `None`: voxels of one metre, and samples as far apart as the first file says, or a voxel if it says
+    /// nothing.
     pub scale: Option<ElevationScale>,
     /// The materials. `None`: material 0 everywhere.
     pub materials: Option<MaterialFiles>,

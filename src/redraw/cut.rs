@@ -40,7 +40,8 @@ impl DrawnCut {
 pub struct NodeUpdate {
     /// The node.
     pub node: Node,
-    /// The node's own mesh, relative to its lowest column at y = 0; `None` if the node is drawn by its tile and chunks, or not at all.
+    /// The node's own mesh, relative to its lowest column at y = 0; `None` if the node is drawn by its tile and chunks,
+    /// or not at all.
     pub mesh: Option<Arc<SurfaceMesh>>,
     /// Tile and chunks that are drawn from now on.
     pub(crate) shown: Vec<(MeshKey, SurfaceDraft)>,

@@ -117,8 +117,8 @@ pub(super) fn start_opening(
             Some(Ok(None)) => continue,
             Some(Ok(Some(level))) => Some((level.clone(), levels.path_of(start))),
         };
-        // The game does not see this as a change. A new world is made of the terrain as it is now, and what is committed from
-        // now on follows.
+        // The game does not see this as a change. A new world is made of the terrain as it is now, and what is
+        // committed from now on follows.
         let terrain = terrain.bypass_change_detection();
         terrain.abandon();
         // A new log says the rules of edits that wait.

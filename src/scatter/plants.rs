@@ -84,8 +84,9 @@ impl Plant {
         Shape::sphere(place.as_vec3(), 0.25)
     }
 
-    /// The brush that removes it, in voxels: it paints the one sample nearest to its foot with the ground's own material, which
-    /// changes nothing but that the sample counts as edited. Plants on the four cells around that sample go with it.
+    /// The brush that removes it, in voxels: it paints the one sample nearest to its foot with the ground's own
+    /// material, which changes nothing but that the sample counts as edited. Plants on the four cells around that
+    /// sample go with it.
     pub fn removal(&self) -> Brush {
         Brush::paint(self.mark(), MaterialId::GROUND)
     }
@@ -127,8 +128,8 @@ impl Scatter {
         &self.species
     }
 
-    /// The plants of the undug ground on the cells from `low` to `high`, both included, of the species that `is_wanted` accepts;
-    /// in order of their ids. An area gives the same plants whole or in parts.
+    /// The plants of the undug ground on the cells from `low` to `high`, both included, of the species that `is_wanted`
+    /// accepts; in order of their ids. An area gives the same plants whole or in parts.
     pub fn plants(
         &self,
         ground: &Ground,

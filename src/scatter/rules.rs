@@ -31,14 +31,15 @@ pub struct ScatterRules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Species {
-    /// The name, which seeds where the plants stand. The species' place in the list matters only for [`room`](Self::room).
+    /// The name, which seeds where the plants stand. The species' place in the list matters only for
+    /// [`room`](Self::room).
     pub name: String,
     /// Sides of the squares that have one spot each, 1/16 to 1024.
     pub spacing: f32,
     /// The share of spots that are used, 0 to 1.
     pub density: f32,
-    /// Least distance between two plants of this species, at most 4 times the spacing. Of two that are too near to each other,
-    /// one is left out.
+    /// Least distance between two plants of this species, at most 4 times the spacing. Of two that are too near to each
+    /// other, one is left out.
     pub distance: f32,
     /// Species that come later in the list keep this distance, at most 64.
     pub room: f32,

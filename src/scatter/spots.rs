@@ -95,8 +95,8 @@ pub(super) fn nearest_column(x: i32, z: i32) -> Column {
     Column::new((x + ONE / 2).div_euclid(ONE), (z + ONE / 2).div_euclid(ONE))
 }
 
-/// The chance of a spot by the groups around it: certain in the inner half of a group's area, falling to 0 at one and a half
-/// times that area.
+/// The chance of a spot by the groups around it: certain in the inner half of a group's area, falling to 0 at one and a
+/// half times that area.
 fn chance(rule: &Rule, at: (i32, i32)) -> i64 {
     let Some((size, squared_radius)) = rule.clusters else { return WHOLE };
     let own = (at.0.div_euclid(size), at.1.div_euclid(size));

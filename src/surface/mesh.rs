@@ -36,8 +36,8 @@ impl MaterialMix {
         }
     }
 
-    /// The shares of the materials of some columns, each of which counts the same, in integers. The four with the largest
-    /// shares are kept.
+    /// The shares of the materials of some columns, each of which counts the same, in integers. The four with the
+    /// largest shares are kept.
     pub fn of_columns(columns: impl Iterator<Item = ColumnMaterial>) -> Self {
         let mut parts: Vec<(u8, i32)> = Vec::with_capacity(8);
         for column in columns {

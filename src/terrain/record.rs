@@ -31,8 +31,8 @@ impl LogEntry {
 /// A commit: the requests and their results.
 #[derive(Clone, Debug)]
 pub struct CommitRecord {
-    /// The commit's number in the log that it was taken from: one more than that of the record before. A log whose numbers have
-    /// a gap has lost records. A saved record has the number 0.
+    /// The commit's number in the log that it was taken from: one more than that of the record before. A log whose
+    /// numbers have a gap has lost records. A saved record has the number 0.
     pub number: u64,
     /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same
     /// where only rules or settings changed.

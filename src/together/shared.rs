@@ -24,8 +24,8 @@ use crate::terrain::Receipt;
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
-    /// Images, grids and prefabs that the player's edits may hold. The server needs them too; players that lack one get it from
-    /// there.
+    /// Images, grids and prefabs that the player's edits may hold. The server needs them too; players that lack one get
+    /// it from there.
     pub contents: ContentTable,
     /// The player's position, in voxels of the terrain: missing ground is fetched from there outwards.
     pub position: IVec3,
@@ -88,8 +88,8 @@ pub enum EditOutcome {
     /// moment, so that the result is not known; the [`BrushApplied`](crate::plugin::BrushApplied) then has an empty
     /// outcome.
     Confirmed(Option<Receipt>),
-    /// The edit was refused, and is no longer shown. `None` if it could not be sent, or the player was disconnected when it
-    /// was refused.
+    /// The edit was refused, and is no longer shown. `None` if it could not be sent, or the player was disconnected
+    /// when it was refused.
     Refused(Option<Refusal>),
 }
 

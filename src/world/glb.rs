@@ -192,8 +192,8 @@ impl World {
     /// one mesh each, whole where they reach beyond the box. Every triangle that is drawn is there, and no other.
     ///
     /// Positions are in metres, for voxels of this size, y up. Vertices have their normals, the colours that `colours`
-    /// gives (linear red, green and blue, 0 to 1), mixed by weight, and the attributes `_MATERIALS` and `_WEIGHTS` with up
-    /// to four materials and their weights.
+    /// gives (linear red, green and blue, 0 to 1), mixed by weight, and the attributes `_MATERIALS` and `_WEIGHTS` with
+    /// up to four materials and their weights.
     ///
     /// # Errors
     /// [`GlbError`]

@@ -144,7 +144,8 @@ impl Patch {
         regions
     }
 
-    /// Swaps these bricks and fields with those of a world; a second swap restores it. Names of fields are never reused.
+    /// Swaps these bricks and fields with those of a world; a second swap restores it. Names of fields are never
+    /// reused.
     pub(crate) fn swap(&mut self, world: &mut World) {
         for (pos, brick) in &mut self.bricks {
             let (key, y) = (pos.stack(), pos.0.y);

@@ -470,8 +470,8 @@ impl QuantizedShape {
         self.restore().unwrap_or(Shape::sphere(Vec3::ZERO, 0.0).into())
     }
 
-    /// At least the volume of all that lies within a distance of the shape, in cubes of 1/256 voxel, where that is known
-    /// to be much less than the volume of a box around it.
+    /// At least the volume of all that lies within a distance of the shape, in cubes of 1/256 voxel, where that is
+    /// known to be much less than the volume of a box around it.
     pub(super) fn volume_within(&self, grow: i32) -> Option<f64> {
         match self {
             Self::Path(path) => Some(path.volume_within(grow)),

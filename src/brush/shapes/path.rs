@@ -25,8 +25,8 @@ pub(super) const LONGEST: i32 = 8192;
 /// The maximum number of straight pieces that stand for the curve between two points.
 const PIECES: i32 = 32;
 
-/// A path through points, with a radius at each. As a shape it is the tube around it: a tunnel if it is dug, a wall or a
-/// pipe if it is added.
+/// A path through points, with a radius at each. As a shape it is the tube around it: a tunnel if it is dug, a wall or
+/// a pipe if it is added.
 ///
 /// Radii change evenly from point to point. A path is one edit, however long it is, and costs as much as its tube is
 /// long.

@@ -19,8 +19,8 @@ pub const MAX_LAYERS: usize = 16;
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SplatOptions {
-    /// The material of each channel of all files, one after the other: red, green, blue and alpha, or the grey of a file
-    /// with one channel. `None` ignores a channel. At most [`MAX_LAYERS`] have a material.
+    /// The material of each channel of all files, one after the other: red, green, blue and alpha, or the grey of a
+    /// file with one channel. `None` ignores a channel. At most [`MAX_LAYERS`] have a material.
     pub layers: Vec<Option<MaterialId>>,
     /// The material below the surface. `None`: the strongest layer goes all the way down, and blends with the second
     /// strongest on the surface.
@@ -40,8 +40,8 @@ impl SplatOptions {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IdOptions {
-    /// The material of each id. An id is the grey of a sample, or the entry of a palette, as the file has it. Without any,
-    /// the id is the material itself.
+    /// The material of each id. An id is the grey of a sample, or the entry of a palette, as the file has it. Without
+    /// any, the id is the material itself.
     pub ids: Vec<(u16, MaterialId)>,
     /// The material of each colour, for files with colours; exactly these.
     pub colours: Vec<([u8; 3], MaterialId)>,

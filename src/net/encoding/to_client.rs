@@ -134,8 +134,8 @@ impl ToClient {
         }
     }
 
-    /// Reads a message from a server. Edits whose contents the table lacks get placeholders; the names of what is missing
-    /// are returned too.
+    /// Reads a message from a server. Edits whose contents the table lacks get placeholders; the names of what is
+    /// missing are returned too.
     pub(in crate::net) fn read(
         bytes: &[u8],
         ground: &Ground,

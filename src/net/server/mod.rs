@@ -387,7 +387,8 @@ impl Server {
     /// Orders an edit of the game, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
     ///
     /// # Errors
-    /// When it holds an image, grid or prefab that is not among the [contents](Self::contents_mut): no client could read it.
+    /// When it holds an image, grid or prefab that is not among the [contents](Self::contents_mut): no client could
+    /// read it.
     pub fn edit(&mut self, edit: Edit) -> Result<(), UnknownContent> {
         if !self.contents.can_send(&edit) {
             return Err(UnknownContent);

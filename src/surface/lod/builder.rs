@@ -63,8 +63,8 @@ impl Builder {
     }
 
     /// Whether the cell with its lowest corner at these places is split along (x, z + s)-(x + s, z), and not along
-    /// (x, z)-(x + s, z + s): the line whose middle is nearer to the ground. On a ridge that runs along the other one, each
-    /// cell would be a tooth.
+    /// (x, z)-(x + s, z + s): the line whose middle is nearer to the ground. On a ridge that runs along the other one,
+    /// each cell would be a tooth.
     pub fn splits_across(&self, [x, z]: [usize; 2]) -> bool {
         self.splits[z * (self.columns[0].len() - 1) + x]
     }

@@ -1,8 +1,8 @@
 //! The vertex of a lattice edge of any length (rules 8 and 9).
 //!
-//! A vertex depends on heights, edits and its edge alone, so changing the level of detail moves none. Where nodes of different
-//! levels meet, vertices of edges of different lengths may lie at the same place; there, all of them are the vertex of
-//! the shortest.
+//! A vertex depends on heights, edits and its edge alone, so changing the level of detail moves none. Where nodes of
+//! different levels meet, vertices of edges of different lengths may lie at the same place; there, all of them are the
+//! vertex of the shortest.
 
 use glam::IVec3;
 

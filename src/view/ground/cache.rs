@@ -10,11 +10,11 @@ use bevy::prelude::*;
 
 use super::bake::{Layers, Meter};
 
-/// The folder in which this crate keeps the textures that it paints, so that the next start need not paint them again. Without
-/// a folder, the default, nothing is written. Insert it before the first [`GroundLook`](super::GroundLook).
+/// The folder in which this crate keeps the textures that it paints, so that the next start need not paint them again.
+/// Without a folder, the default, nothing is written. Insert it before the first [`GroundLook`](super::GroundLook).
 ///
-/// A file takes 45 MB for textures of 512 texels a side. It is not used if it is damaged, or if another version of this crate
-/// would paint other textures; then it is replaced. A folder that can't be written only causes a warning.
+/// A file takes 45 MB for textures of 512 texels a side. It is not used if it is damaged, or if another version of this
+/// crate would paint other textures; then it is replaced. A folder that can't be written only causes a warning.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -75,7 +75,8 @@ impl SkyColumns<'_> {
         horizons
     }
 
-    /// Raises the horizons of eight columns to the tops near them that were dug or built, or are seen from such columns.
+    /// Raises the horizons of eight columns to the tops near them that were dug or built, or are seen from such
+    /// columns.
     #[inline(always)]
     fn raise_near<T: Height>(
         &self,

@@ -247,8 +247,8 @@ impl<'a> SkyColumns<'a> {
         &self.lights
     }
 
-    /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices. Where that
-    /// was dug, it is the light on the ground below.
+    /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices. Where
+    /// that was dug, it is the light on the ground below.
     pub fn ground_lights(&mut self) -> Vec<Light> {
         let mut lights: Vec<Light> = self.lights().iter().map(|&sky| Light::open(sky)).collect();
         let width = self.size[0];
