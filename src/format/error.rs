@@ -75,7 +75,7 @@ pub enum FormatError {
     File {
         /// The file's name.
         name: String,
-        /// What is wrong with it.
+        /// What is wrong with the file.
         why: String,
     },
 }

@@ -66,7 +66,7 @@ pub enum GroundError {
         name: Cow<'static, str>,
         /// The value given.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         allowed: &'static str,
     },
     /// The machine has too little memory for the world.

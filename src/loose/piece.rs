@@ -80,11 +80,11 @@ pub struct LoosePiece {
 /// A piece that came back: what an undo restored as ground.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReturnedPiece {
-    /// The id that it had when it was cut off.
+    /// The id that the piece had when it was cut off.
     pub id: PieceId,
     /// The tag of the brush that had cut it off; 0 where players share the terrain.
     pub tag: u64,
-    /// What had happened to it then: [`PieceFate::Removed`] or [`PieceFate::BrokeOff`].
+    /// What happened to the piece when it was cut off: [`PieceFate::Removed`] or [`PieceFate::BrokeOff`].
     pub fate: PieceFate,
     /// The piece's voxels by material.
     pub materials: MaterialCounts,

@@ -102,7 +102,7 @@ impl Entry {
         Self::Order { by: None, order }
     }
 
-    /// What it asks of a terrain; `None` for a mark.
+    /// The order to a terrain; `None` for a mark.
     pub fn order(&self) -> Option<&Order> {
         if let Self::Order { order, .. } = self { Some(order) } else { None }
     }

@@ -53,11 +53,11 @@ pub struct Species {
     pub materials: Vec<MaterialId>,
     /// Groups in which it grows; everywhere if `None`.
     pub clusters: Option<Clusters>,
-    /// What must stay as it is for the plant to stand.
+    /// The space that must stay as it is for the plant to stand.
     pub clearance: Clearance,
-    /// What bodies and rays meet; `None` if they pass through.
+    /// The cylinder that bodies and rays meet; `None` if they pass through.
     pub stem: Option<Stem>,
-    /// How far it is drawn.
+    /// How far the species is drawn.
     pub view: ViewDistances,
 }
 

@@ -63,7 +63,7 @@ pub enum StoreError {
         "the world was created from the level `{label}`, without which it can't be opened: give that level"
     )]
     LevelMissing {
-        /// What the game called the level.
+        /// The name that the game gave the level.
         label: String,
     },
     /// The world is based on another level than the given one, or the level has changed since, and
@@ -73,7 +73,7 @@ pub enum StoreError {
          level, or allow `base_changed`, which moves the world"
     )]
     LevelChanged {
-        /// What the game called the level.
+        /// The name that the game gave the level.
         label: String,
         /// The [hash](super::LevelName::hash) of the world's level.
         expected: u64,

@@ -16,7 +16,7 @@ pub(crate) struct PackedVertices<'a> {
     pub mixes: PackedMixes<'a>,
 }
 
-/// What packed vertices are made of.
+/// The materials of packed vertices.
 #[derive(Clone, Copy)]
 pub(crate) enum PackedMixes<'a> {
     /// One mix for all.

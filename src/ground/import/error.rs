@@ -109,7 +109,7 @@ pub enum ImportError {
     Ascii {
         /// Number of the line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// What is wrong with the line.
         problem: String,
     },
     /// Heights cannot be written in a format.
@@ -231,7 +231,7 @@ pub enum ImportError {
         name: &'static str,
         /// The value given.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         allowed: &'static str,
     },
     /// Tiles do not make a rectangle.
@@ -243,7 +243,7 @@ pub enum ImportError {
         column: i32,
         /// Row of the tile.
         row: i32,
-        /// What is wrong with it.
+        /// What is wrong with the tile.
         problem: String,
     },
 }

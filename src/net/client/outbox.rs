@@ -16,7 +16,7 @@ enum Item {
     Undo(ClientId),
 }
 
-/// What it costs.
+/// The cost of an item.
 #[derive(Clone, Copy)]
 struct Cost {
     /// The cost as soon as the item arrives.
