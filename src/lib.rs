@@ -262,18 +262,18 @@
 //!    rounded: [`SampleView::distance`](volume::SampleView::distance).
 //! 2. **The mask follows edits, not boxes.** A cell is drawn by marching cubes when a corner of its *sheet*,
 //!    the cubes that the pristine surface crosses over it, is edited. All samples of the sheet outside the
-//!    mask are then pristine: [`surface::mask`].
-//! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex: [`fan`](surface::tile::fan).
+//!    mask are then pristine: `surface::mask`.
+//! 3. **The ring is a fan** from the border polyline to the opposite heightmap vertex: `surface::tile::fan`.
 //! 4. **One vertex function, keyed by lattice edge,** for cubes and ring, in integers:
-//!    [`vertex`](surface::vertex::vertex).
+//!    `surface::vertex::vertex`.
 //! 5. **The y-range covers every sign change** of the footprint, in as many chunks above and below as that takes:
-//!    [`sheet`](surface::mask::sheet) gives it.
+//!    `surface::mask::sheet` returns it.
 //! 6. **Brushes are band-limited:** nothing farther than two voxels outside a shape changes:
 //!    [`Edit::reach`](brush::Edit::reach).
 //!
-//! Three more rules close the gaps between [levels of detail](lod): a coarse cell fans over the line of its finer
+//! Three more rules close the gaps between levels of detail: a coarse cell fans over the line of its finer
 //! neighbours, a coarse vertex of an edit is a vertex of the finest level, and columns beyond the rim equal the rim's
-//! ([`surface::lod`]).
+//! (`surface::lod`).
 //!
 //! Rejected alternatives: *snapping* border vertices to the nearest point of the other surface tears on steep
 //! ground; *skirts* hide cracks but not lighting, and break collision; *converting whole boxes* to voxels makes deep
@@ -301,7 +301,7 @@
 //! # What an edit costs
 //!
 //! The cost depends on the region that its brush reaches, not on the chunk size. Bricks of 8x8x8 samples are copied,
-//! changed and shared; each keeps a bit per sample for solid and for edited, so that [`block`](surface::block) finds
+//! changed and shared; each keeps a bit per sample for solid and for edited, so that `surface::block` finds
 //! the cubes to draw by a few operations on whole layers and looks at samples only around them. Parts of a chunk's mesh
 //! that did not change are copied from its last one, and so are rings of a tile. Nothing is allocated while meshing.
 //! Bricks, blocks and chunks of a large transaction are spread over rayon's threads; the result does not depend on how

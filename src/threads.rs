@@ -105,7 +105,7 @@ impl Pool {
         }
     }
 
-    /// Its threads; `None` where there are none. Until it has a number, it has the default one.
+    /// The pool's threads; `None` where there are none. Until a number is set, the pool has the default number.
     fn threads(&self, default: impl FnOnce() -> usize) -> Option<Arc<ThreadPool>> {
         let state = self.state.read().unwrap_or_else(PoisonError::into_inner);
         if let Some(threads) = &state.threads {
@@ -142,7 +142,7 @@ impl Threads {
         count.max(1)
     }
 
-    /// Its threads; `None` where there are none.
+    /// The threads of this kind; `None` where there are none.
     fn pool(self) -> Option<Arc<ThreadPool>> {
         POOLS[self as usize].threads(|| self.count(&ThreadSettings::default()))
     }

@@ -139,7 +139,7 @@ def main():
     indexed.save(file, "PNG")
     splats("palette", [file.getvalue()], [1], error="palette")
     splats("cut", [pillow(rgba())[:120]], [1], error="decoded")
-    splats("no_png", [b"P5 3 3 255 123456789"], [1], error="no PNG file")
+    splats("no_png", [b"P5 3 3 255 123456789"], [1], error="not a PNG file")
     splats("nothing", [b""], [1], error="no samples")
 
     kinds = byte(11, 6) % 9

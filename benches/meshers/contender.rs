@@ -31,9 +31,9 @@ pub enum Sharing {
 /// The contents of a contender's meshes. Only contenders of the same class are compared.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Class {
-    /// Its normals.
+    /// Normals of the meshes.
     pub shading: Shading,
-    /// Its vertices.
+    /// Whether triangles share vertices.
     pub sharing: Sharing,
     /// One vertex per cell and quads between them (dual), instead of one vertex per crossed edge.
     pub dual: bool,

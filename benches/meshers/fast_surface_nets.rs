@@ -6,7 +6,7 @@ use fast_surface_nets::{SurfaceNetsBuffer, surface_nets};
 use crate::contender::{Class, Contender, Mesh, Part, Shading, Sharing};
 use crate::fields::Grid;
 
-/// Its name in tables.
+/// The mesher's name in tables.
 pub const NAME: &str = "fast-surface-nets 0.2.1";
 
 /// The peer and its buffers.

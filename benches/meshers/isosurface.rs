@@ -49,7 +49,7 @@ impl Contender for MarchingCubes {
     }
 
     fn mesh(&mut self, grid: &Grid, part: Part) {
-        assert_eq!(part, Part::Whole, "does not support streams");
+        assert_eq!(part, Part::Whole, "isosurface only meshes whole grids");
         self.vertices.clear();
         self.indices.clear();
         let source = Samples { samples: &grid.samples, side: grid.size, cells: (grid.size - 1) as f32 };

@@ -8,7 +8,7 @@ use mcubes::{MarchingCubes as Peer, Mesh as PeerMesh, MeshSide};
 use crate::contender::{Class, Contender, Mesh, Part, Shading, Sharing};
 use crate::fields::Grid;
 
-/// The peer, the copy of the samples that it owns, and its last mesh.
+/// The mesher with its samples, once loaded, and its last mesh.
 #[derive(Default)]
 pub struct MarchingCubes {
     loaded: Option<Peer>,
@@ -40,7 +40,7 @@ impl Contender for MarchingCubes {
     }
 
     fn mesh(&mut self, _grid: &Grid, part: Part) {
-        assert_eq!(part, Part::Whole, "does not support streams");
+        assert_eq!(part, Part::Whole, "mcubes only meshes whole grids");
         self.mesh = self.loaded.as_ref().map(|peer| peer.generate(MeshSide::InsideOnly));
     }
 

@@ -35,9 +35,9 @@ pub enum TopologyError {
     /// A vertex of marching cubes that is not on a lattice edge.
     #[error("vertex {vertex} at {position:?} lies on no edge of the lattice")]
     OffLattice {
-        /// Its index.
+        /// Index of the vertex.
         vertex: usize,
-        /// Its position.
+        /// Position of the vertex.
         position: [f32; 3],
     },
     /// An index out of range.

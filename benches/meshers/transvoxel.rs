@@ -88,7 +88,7 @@ impl Contender for Transvoxel {
     }
 
     fn mesh(&mut self, grid: &Grid, part: Part) {
-        assert_eq!(part, Part::Whole, "does not support streams");
+        assert_eq!(part, Part::Whole, "transvoxel only meshes whole grids");
         let cells = grid.size - 1;
         let samples = Samples { block: Block::new([0.0; 3], cells as f32, cells), samples: &grid.samples };
         self.buffers.positions.clear();

@@ -1,4 +1,4 @@
-//! Figures that walk where landmass sends them.
+//! The walking agents: capsules that landmass steers over the ground. (The figures of the guide are in `examples/figures`.)
 
 use bevy::prelude::*;
 use bevy_burrow::paths::bevy_landmass::prelude::*;
@@ -6,11 +6,12 @@ use bevy_burrow::prelude::*;
 
 use crate::scene::{AGENT, PASS, PLAIN, Paths};
 
-/// How many there are, the first ones ahead of the others.
+/// The number of agents.
 pub const COUNT: usize = 12;
+/// How many of them start ahead of the others, and walk faster.
 const FIRST: usize = 4;
 
-/// A figure, where it came from and where it goes.
+/// An agent's start and destination.
 #[derive(Component, Clone, Copy)]
 pub struct Figure {
     pub home: Vec3,

@@ -29,7 +29,7 @@ pub struct GroundArgs {
     /// The hills of the example `server`, with this many cells along each side
     #[arg(long, value_name = "N", conflicts_with = "heights", global = true)]
     side: Option<u32>,
-    /// The level that the world was begun on: its folder, or the packed file
+    /// The level that the world was created from: its folder, or the packed file
     #[arg(long, value_name = "PATH", global = true)]
     level: Option<PathBuf>,
     /// What `repair`, `compact` and `import` do if the ground or the level is not the one that the world was saved

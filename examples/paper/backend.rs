@@ -5,7 +5,7 @@ use std::time::Duration;
 use bevy_burrow::backend::{Backend as Kind, Engine, EngineState};
 use bevy_burrow::terrain::{Commit, Transaction};
 
-/// The CPU that does the work.
+/// What runs the transactions: the CPU or a CUDA GPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backend {
     Cpu,

@@ -44,7 +44,7 @@ impl Ground {
 pub struct Surface {
     /// Marching-cubes triangles of the hybrid.
     pub triangles: usize,
-    /// Those that are missing in the full field.
+    /// Triangles of the hybrid that are missing in the full field.
     pub missing: usize,
     /// Triangles of the full field that are missing in the hybrid, in cells that it draws with marching cubes.
     pub extra: usize,

@@ -44,7 +44,7 @@ pub fn count(
 
 /// The ground within `reach` metres that a picture lacks because of the camera's depth prepass: it is compared with one
 /// that was taken from the same place without the prepass, where nothing can be missing.
-#[allow(dead_code, reason = "for those whose background is no single colour")]
+#[allow(dead_code, reason = "for those whose background is not a single colour")]
 pub fn count_against(app: &App, camera: Entity, picture: &RgbImage, whole: &RgbImage, reach: f32) -> Holes {
     let differs = |a: u8, b: u8| a.abs_diff(b) > 24;
     count(app, camera, picture, reach, |x, y, pixel| {

@@ -24,7 +24,7 @@ pub struct Developed(pub usize);
 /// A camera that renders into an image. It renders only while pictures are taken, as a frame in software is slow.
 pub struct Photographer {
     camera: Entity,
-    /// Its render target.
+    /// The camera's render target.
     pub film: Handle<Image>,
     /// Whether the camera also renders between pictures.
     pub draws_all: bool,

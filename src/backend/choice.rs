@@ -36,7 +36,7 @@ pub struct Choice {
     pub estimate: Option<Estimate>,
     /// Whether the GPU ran it.
     pub is_cuda: bool,
-    /// Its duration.
+    /// The duration of the stage.
     pub took: Duration,
     /// Time of uploads and kernels on the GPU.
     pub device: Duration,

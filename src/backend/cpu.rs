@@ -82,7 +82,7 @@ fn mesh(view: &WorldView, blocks: &[Block], parts: &mut Parts) {
 #[derive(Default)]
 struct Lists {
     count: AtomicUsize,
-    /// With their numbers: lists with room that no thread uses.
+    /// Lists with room that no thread uses, with their numbers.
     open: Mutex<Vec<(usize, Parts)>>,
     full: Mutex<Vec<(usize, Parts)>>,
 }
@@ -103,7 +103,7 @@ impl Lists {
         lock(if is_full { &self.full } else { &self.open }).push((number, parts));
     }
 
-    /// All of them, by number.
+    /// All lists, by number.
     fn all(self) -> Vec<Parts> {
         let [mut all, full] =
             [self.open, self.full].map(|lists| lists.into_inner().unwrap_or_else(PoisonError::into_inner));

@@ -110,7 +110,7 @@ impl Engine {
         }))
     }
 
-    /// What it runs on now.
+    /// What the engine runs on now.
     pub fn state(&self) -> EngineState {
         #[cfg(feature = "cuda")]
         if let Some(cuda) = &self.0.cuda {

@@ -30,8 +30,8 @@ pub(crate) enum ContentMut<'a> {
 }
 
 impl ContentMut<'_> {
-    /// Puts a placeholder there: an image of 2 x 2 black samples, a grid in such an image, or a prefab of a single sample
-    /// of air.
+    /// Puts a placeholder there: an image of 2 x 2 black samples, a grid in such an image, or a prefab of a single
+    /// sample of air.
     pub fn clear(&mut self) {
         match self {
             Self::Image(image) => **image = Arc::new(GreyImage::placeholder()),

@@ -259,8 +259,8 @@ impl Edit {
         }
     }
 
-    /// Whether it certainly changes none of these samples: of a path, whose box is mostly empty, also those far from its
-    /// pieces.
+    /// Whether it certainly changes none of these samples: of a path, whose box is mostly empty, also those far from
+    /// its pieces.
     pub(crate) fn misses(&self, samples: LatticeBox) -> bool {
         let Some(samples) = self.reach().intersection(samples) else { return true };
         self.max_bricks().is_some() && self.evaluator().is_out_of_reach(samples)

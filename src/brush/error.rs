@@ -54,7 +54,7 @@ pub enum BrushError {
         /// The least length.
         least: f32,
     },
-    /// The quaternion is no rotation: its length is not within 1/100 of 1.
+    /// The quaternion is not a rotation: its length is not within 1/100 of 1.
     #[error("`rotation` is a quaternion of length {length}, but it must be 1 (within 0.01)")]
     ZeroRotation {
         /// Length of the quaternion.
@@ -98,7 +98,7 @@ pub enum BrushError {
     NoDirection {
         /// The field.
         what: &'static str,
-        /// Its length.
+        /// The length of the direction.
         length: f32,
     },
     /// The image of a stamp has too few or too many samples along a side.
@@ -128,7 +128,7 @@ pub enum BrushError {
         "the path has {count} points, but it must have {least} to {most}: divide a longer one into brushes of one stroke"
     )]
     PathPoints {
-        /// Its points.
+        /// Points of the path.
         count: usize,
         /// The minimum number of points.
         least: usize,
@@ -176,7 +176,7 @@ pub enum BrushError {
         /// Edges with more triangles on the one side than on the other.
         edges: usize,
     },
-    /// A road is built in a shape that is no corridor.
+    /// A road is built in a shape that is not a corridor.
     #[error("a road needs a corridor: make the brush by `Brush::road`")]
     NoCorridor,
     /// The blend of a deserialised edit is missing where its operation sculpts, or given where it does not.

@@ -406,7 +406,7 @@ proptest! {
                 prop_assert_eq!(found.check(), Ok(()));
                 let [own, written] = [edit, serde_json::to_value(&found).unwrap()];
                 prop_assert_eq!(&own["shape"], &written["shape"]);
-                // A bump of no height is none.
+                // A bump without height is left out.
                 prop_assert_eq!(written["roughness"].is_null(), amplitude == 0);
             }
             Err(error) => {

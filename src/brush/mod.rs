@@ -59,11 +59,11 @@
 //! on a heightmap; where the ground was dug, it is the distance to the surface, and they work on walls and
 //! ceilings too. A sample whose density stays as it is is not edited.
 //!
-//! [`Operation::Fill`] and [`Operation::Carve`] are an add and a dig with the edge between shape and ground rounded, by a
-//! radius that is the blend's falloff. They reach that far beyond the shape.
+//! [`Operation::Fill`] and [`Operation::Carve`] are an add and a dig with the edge between shape and ground rounded, by
+//! a radius that is the blend's falloff. They reach that far beyond the shape.
 //!
-//! New solid samples get the blend's material; without one, that of the [`ShapeGrid`] at this place, if the shape is one
-//! with [materials](ShapeGrid::with_materials); else of the first solid voxel straight below within 64 voxels, else
+//! New solid samples get the blend's material; without one, that of the [`ShapeGrid`] at this place, if the shape is
+//! one with [materials](ShapeGrid::with_materials); else of the first solid voxel straight below within 64 voxels, else
 //! straight above within 64, else of the first solid neighbour (-x, +x, -z, +z), else of the ground's own.
 //!
 //! ```

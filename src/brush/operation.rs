@@ -11,10 +11,10 @@ use crate::ground::MaterialId;
 
 /// The operation inside the shape.
 ///
-/// Dig, add, paint, reset and paste look at one sample at a time, all but the last as far as [`BAND`](super::BAND) beyond
-/// their shape. All others *sculpt*: they read what lies around and have the brush's [`Blend`](super::Blend), by which most
-/// fade. They change nothing outside, except for fill and carve. Beyond the world's rim they assume that everything
-/// continues as at the rim.
+/// Dig, add, paint, reset and paste look at one sample at a time, all but the last as far as [`BAND`](super::BAND)
+/// beyond their shape. All others *sculpt*: they read what lies around and have the brush's [`Blend`](super::Blend), by
+/// which most fade. They change nothing outside, except for fill and carve. Beyond the world's rim they assume that
+/// everything continues as at the rim.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -50,7 +50,7 @@ pub enum Operation {
     },
     /// Makes the surface level.
     Level {
-        /// Its height in voxels.
+        /// The height of the level surface, in voxels.
         height: f32,
     },
     /// Moves the surface outwards, which is up on pristine ground. Where a dig or an add was, distances are known
@@ -96,14 +96,15 @@ pub enum Operation {
     /// does not fall.
     Reset,
     /// Makes the ground a road along the path of a [`Corridor`](super::Corridor): level across, with air above it and
-    /// ground below it, as far as the corridor goes up and down. It fades into the ground at its sides over the falloff,
-    /// its shoulders. Ground higher than the corridor stays as the roof of a tunnel, and air below it as a culvert.
+    /// ground below it, as far as the corridor goes up and down. It fades into the ground at its sides over the
+    /// falloff, its shoulders. Ground higher than the corridor stays as the roof of a tunnel, and air below it as a
+    /// culvert.
     Road,
-    /// Fills with ground like an [`Add`](Self::Add), and rounds the edge between the shape and the ground: a smooth union.
-    /// The radius of the rounding is the blend's falloff, at most 16 voxels; with 0 it is a plain union. It changes ground
-    /// that far beyond the shape, at least [`BAND`](super::BAND). New ground has the blend's material, the shape's own
-    /// where that has [some](super::ShapeGrid::with_materials), or that of the ground below it. Each application rounds
-    /// again, by at most 0.42 of the radius.
+    /// Fills with ground like an [`Add`](Self::Add), and rounds the edge between the shape and the ground: a smooth
+    /// union. The radius of the rounding is the blend's falloff, at most 16 voxels; with 0 it is a plain union. It
+    /// changes ground that far beyond the shape, at least [`BAND`](super::BAND). New ground has the blend's material,
+    /// the shape's own where that has [some](super::ShapeGrid::with_materials), or that of the ground below it. Each
+    /// application rounds again, by at most 0.42 of the radius.
     Fill,
     /// Removes ground like a [`Dig`](Self::Dig), and rounds the rim of the hole. The radius is the blend's falloff, as
     /// for a [`Fill`](Self::Fill).

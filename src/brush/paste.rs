@@ -28,7 +28,7 @@ const SCALE: (f32, f32) = (0.125, 8.0);
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paste {
-    /// What is pasted.
+    /// The prefab that is pasted.
     #[serde(with = "shared")]
     pub prefab: Arc<Prefab>,
     /// The place of its anchor.

@@ -103,19 +103,19 @@ impl PrefabSample {
 
 /// A box of a world: the density and the material of each of its samples, and which of them were edited.
 ///
-/// [`World::copy`](crate::terrain::World::copy) makes one, and a brush pastes it: see [`Paste`](super::Paste). It is kept
-/// in a file by `format::write_prefab`, and named by its [hash](Self::hash) in what is sent to clients.
+/// [`World::copy`](crate::terrain::World::copy) makes one, and a brush pastes it: see [`Paste`](super::Paste). It is
+/// kept in a file by `format::write_prefab`, and named by its [hash](Self::hash) in what is sent to clients.
 #[derive(Clone)]
 pub struct Prefab {
     size: IVec3,
     anchor: IVec3,
     above_ground: i32,
-    /// Of each sample, x fastest, then z, then y.
+    /// Densities of all samples, x fastest, then z, then y.
     densities: Vec<i16>,
     materials: Vec<MaterialId>,
     marks: Vec<u8>,
     hash: u64,
-    /// Its file, made when it is first needed.
+    /// The prefab as a file, made when it is first needed.
     packed: OnceLock<Arc<[u8]>>,
 }
 

@@ -105,9 +105,9 @@ impl Shift {
         Self { by, rounds: false }
     }
 
-    /// Moves by a vector, into the voxels of a terrain. Points are rounded to the fraction of a voxel that edits have, and
-    /// moved by whole voxels only then: so they have the same fraction in all terrains that lie whole voxels apart, however
-    /// far that is.
+    /// Moves by a vector, into the voxels of a terrain. Points are rounded to the fraction of a voxel that edits have,
+    /// and moved by whole voxels only then: so they have the same fraction in all terrains that lie whole voxels apart,
+    /// however far that is.
     #[cfg_attr(not(any(test, feature = "plugin")), expect(dead_code))]
     pub fn into_voxels(by: Vec3) -> Self {
         Self { by, rounds: true }

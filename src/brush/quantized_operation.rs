@@ -124,7 +124,7 @@ impl QuantizedOperation {
         }
     }
 
-    /// Its image or its prefab.
+    /// The image or the prefab that the operation uses.
     pub fn content(&self) -> Option<Content<'_>> {
         match self {
             Self::Stamp { stamp } => Some(Content::Image(stamp.image())),

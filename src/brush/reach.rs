@@ -33,7 +33,7 @@ mod tests {
     use crate::brush::{Brush, Edit};
 
     #[test]
-    fn whatever_an_edit_reaches_its_shape_is_near_to() {
+    fn every_edit_inside_a_world_is_near_it() {
         let (grid, mut rng) = (ChunkGrid::new(16, 64, 64), fastrand::Rng::with_seed(2));
         let (mut near, mut far) = (0, 0);
         for _ in 0..2000 {
@@ -62,7 +62,7 @@ mod tests {
     }
 
     #[test]
-    fn a_size_that_is_none_is_near_to_its_place_and_a_place_that_is_none_to_nothing() {
+    fn invalid_sizes_are_near_and_invalid_positions_are_not() {
         let grid = ChunkGrid::new(16, 64, 64);
         let at = Vec3::new(30.0, 8.0, 30.0);
         for radius in [f32::NAN, -3.0, 0.0, 1e9, f32::INFINITY] {

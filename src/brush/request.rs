@@ -43,8 +43,8 @@ use crate::ground::MaterialId;
     reflect(opaque, Clone, Debug, PartialEq, Serialize, Deserialize)
 )]
 pub struct Brush {
-    /// Where. With a custom shape it is not used; constructors and [`transformed`](Self::transformed) set it to a box
-    /// around that one.
+    /// Where the brush works. With a custom shape it is not used; constructors and [`transformed`](Self::transformed)
+    /// set it to a box around that one.
     pub shape: Shape,
     /// A shape that takes the place of `shape`: a path, for example.
     pub custom: Option<Arc<CustomShape>>,
@@ -145,8 +145,9 @@ impl Brush {
         Self::new(shape, Operation::Terrace { step, base: 0.0 })
     }
 
-    /// A brush that fills its shape with ground, whose edge with the ground around is rounded by a radius of 0 to 16 voxels:
-    /// see [`Operation::Fill`]. Without [a material](Self::with_material) it has those of the shape, or of the ground below.
+    /// A brush that fills its shape with ground, whose edge with the ground around is rounded by a radius of 0 to 16
+    /// voxels: see [`Operation::Fill`]. Without [a material](Self::with_material) it has those of the shape, or of the
+    /// ground below.
     ///
     /// ```
     /// use bevy_burrow::prelude::*;
@@ -192,7 +193,7 @@ impl Brush {
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     pub fn road(corridor: Corridor, shoulder: f32) -> Self {
-        // A shoulder that is no number is refused as a falloff.
+        // A shoulder that is not a number is refused as a falloff.
         let path = corridor.path.widened(if shoulder > 0.0 { shoulder } else { 0.0 });
         Self::new(Corridor { path, ..corridor }, Operation::Road).with_falloff(shoulder)
     }
@@ -278,8 +279,8 @@ impl Brush {
         }
     }
 
-    /// The brush in the space of a terrain that is scaled evenly and then rotated and moved. Terrains of equal scale and
-    /// rotation that lie whole voxels apart get brushes that differ by exactly that.
+    /// The brush in the space of a terrain that is scaled evenly and then rotated and moved. Terrains of equal scale
+    /// and rotation that lie whole voxels apart get brushes that differ by exactly that.
     #[cfg(any(test, feature = "plugin"))]
     pub(crate) fn placed_in(&self, scale: f32, rotation: Quat, translation: Vec3) -> Self {
         let (rotation, scale) = (rotation.inverse(), scale.recip());
@@ -292,7 +293,7 @@ impl Brush {
     pub(crate) fn placed_in_stretched(&self, matrix: Mat3A, rotation: Quat, translation: Vec3) -> Self {
         let scale = matrix.determinant().abs().cbrt();
         let (back, by) = (rotation.inverse(), scale.recip());
-        // The space in between is no terrain's: nothing is rounded there.
+        // The space in between does not belong to a terrain: nothing is rounded there.
         let mut brush = self.moved(back, Shift::by(back * -translation * by), by);
         // The rest of the transform into the terrain.
         let rest = matrix.inverse() * Mat3A::from_quat(rotation) * scale;

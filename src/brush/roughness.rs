@@ -9,10 +9,10 @@ use crate::lattice::{ONE, hash::mix};
 
 /// Bumps added to a shape's signed distance: smooth noise in +-`amplitude`.
 ///
-/// The noise is tied to space, not to the shape, so overlapping brushes with one seed and scale fit together. A brush that
-/// is sent to the plugin has the same bumps in every terrain that it reaches: where two terrains with equal voxels lie
-/// side by side, a whole number of voxels apart, they agree on the column that they share, bit for bit. The axes of the
-/// pattern are those of the terrain's lattice.
+/// The noise is tied to space, not to the shape, so overlapping brushes with one seed and scale fit together. A brush
+/// that is sent to the plugin has the same bumps in every terrain that it reaches: where two terrains with equal voxels
+/// lie side by side, a whole number of voxels apart, they agree on the column that they share, bit for bit. The axes of
+/// the pattern are those of the terrain's lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Roughness {
@@ -22,9 +22,9 @@ pub struct Roughness {
     pub scale: f32,
     /// Seed of the pattern.
     pub seed: u32,
-    /// The point that the pattern is tied to: by default the origin, of the world for a brush that is sent to the plugin,
-    /// and of the terrain otherwise. Terrains that move keep their pattern if this point moves with them. It is rounded
-    /// to 1/256 voxel and clamped to 4,194,304 voxels along each axis.
+    /// The point that the pattern is tied to: by default the origin, of the world for a brush that is sent to the
+    /// plugin, and of the terrain otherwise. Terrains that move keep their pattern if this point moves with them. It is
+    /// rounded to 1/256 voxel and clamped to 4,194,304 voxels along each axis.
     #[serde(default, skip_serializing_if = "is_default")]
     pub origin: Vec3,
 }
@@ -53,8 +53,8 @@ pub(super) struct QuantizedRoughness {
     origin: [i32; 3],
 }
 
-/// The roughness of an edit, serialised. Edits without an origin have the form of those from before there was one, which
-/// in compact formats is that of an `Option`.
+/// The roughness of an edit, serialised. Edits without an origin have the form of those from before there was one,
+/// which in compact formats is that of an `Option`.
 pub(super) mod optional {
     use super::{Deserialize, Deserializer, QuantizedRoughness, Serialize, Serializer};
 
@@ -118,7 +118,7 @@ impl QuantizedRoughness {
         })
     }
 
-    /// As a brush has it.
+    /// Returns the roughness as a brush has it.
     pub(super) fn roughness(&self) -> Roughness {
         let origin = Vec3::from_array(self.origin.map(voxels));
         Roughness::new(voxels(self.amplitude), voxels(self.scale), self.seed).with_origin(origin)

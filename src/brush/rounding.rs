@@ -1,8 +1,8 @@
 //! The new density of a sample where a shape is united with the ground, or taken out of it, with a rounded edge.
 //!
-//! Where the ground's surface and the shape's surface meet, a ball of the radius rolls along both: what it can't reach is
-//! filled in a union, and taken away where a shape is dug out. In a cut across the edge that is an arc, which touches the
-//! one surface at the radius from the other one:
+//! Where the ground's surface and the shape's surface meet, a ball of the radius rolls along both: what it can't reach
+//! is filled in a union, and taken away where a shape is dug out. In a cut across the edge that is an arc, which
+//! touches the one surface at the radius from the other one:
 //!
 //! ```text
 //! ground's distance d, shape's distance b, radius r:  r - sqrt((r - d)^2 + (r - b)^2)  where both are below r
@@ -29,8 +29,8 @@ impl Rounding {
         self.radius.max(DEPTH)
     }
 
-    /// The density of a sample afterwards, from its density `before`, its signed distance to the shape, `outside`, and its
-    /// distance to the surface of the ground: at most the [horizon](Self::horizon), where it is that or more.
+    /// The density of a sample afterwards, from its density `before`, its signed distance to the shape, `outside`, and
+    /// its distance to the surface of the ground: at most the [horizon](Self::horizon), where it is that or more.
     ///
     /// With a radius of 0 it is that of a plain dig or add.
     pub fn density(self, before: i32, outside: i32, surface: i32) -> i32 {

@@ -84,7 +84,7 @@ pub enum DebugView {
 }
 
 impl DebugView {
-    /// All of them.
+    /// All debug views.
     pub const ALL: [Self; if cfg!(feature = "navigation") { 9 } else { 8 }] = [
         Self::Chunks,
         Self::Fields,

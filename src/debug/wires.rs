@@ -71,7 +71,7 @@ impl SeamWires {
     }
 }
 
-/// The samples within `radius` voxels of a place; `None` where these are no numbers.
+/// The samples within `radius` voxels of a place; `None` if either is not a number.
 pub fn around(place: Vec3, radius: f32) -> Option<LatticeBox> {
     let (min, max) = ((place - radius).floor(), (place + radius).ceil());
     (min.is_finite() && max.is_finite()).then(|| LatticeBox::new(min.as_ivec3(), max.as_ivec3()))?

@@ -29,11 +29,11 @@ const BATCH: usize = 2048;
 /// Where the vertices of a layer's edges begin: in the lists first, in the mesh once those are numbered.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct LayerStart {
-    /// Of edges along x, in row 0 and in row 1.
+    /// Start of edges along x, in row 0 and in row 1.
     pub(super) x: [u32; 2],
-    /// Of edges along y, in row 0.
+    /// Start of edges along y, in row 0.
     pub(super) y: u32,
-    /// Of edges along z, in row 0 and in row 1.
+    /// Start of edges along z, in row 0 and in row 1.
     pub(super) z: [u32; 2],
     /// The end of this layer's cells in [`Cells::cases`].
     pub(super) cases_end: usize,
@@ -55,7 +55,7 @@ struct Columns {
     all: u64,
     /// The column behind the last cell of the row, if it is here.
     row_end: u64,
-    /// Its first column, in layer 0.
+    /// The word's first column, in layer 0.
     origin: Point,
 }
 
@@ -66,7 +66,7 @@ pub(super) struct Cells {
     pub(super) cases: Stream<u16>,
     /// Where crossed edges start that have no vertex yet, for each axis.
     pub(super) edges: [Stream<Point>; 3],
-    /// One for each layer of samples.
+    /// The starts of each layer of samples.
     pub(super) layers: Vec<LayerStart>,
     /// The words of a layer.
     columns: Vec<Columns>,

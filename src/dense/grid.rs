@@ -19,7 +19,7 @@ pub enum DenseGridError {
     Length {
         /// The sides that were asked for.
         size: [usize; 3],
-        /// Their product; `None` where it is no `usize`.
+        /// The product of the sides; `None` where it does not fit a `usize`.
         expected: Option<usize>,
         /// The length of the slice.
         found: usize,

@@ -1,10 +1,10 @@
 //! Marching cubes over a plain dense grid: shared vertices, and unit normals if they are wanted.
 //!
 //! For fields that are stored as one array: imported volumes, simulations, chunks of a game that keeps its own samples.
-//! The terrain's own blocks are meshed by [`block`](crate::surface::block), which follows edits, materials and seams.
+//! The terrain's own blocks are meshed by `surface::block`, which follows edits, materials and seams.
 //!
 //! Samples below zero are solid. Triangles are counter-clockwise seen from the air, and the case table is the one in
-//! [`cases`](crate::surface::cases): a surface that stays away from the grid's border is closed.
+//! `surface::cases`: a surface that stays away from the grid's border is closed.
 //!
 //! ```
 //! use bevy_burrow::dense::{DenseGrid, DenseMesh, DenseMesher, Normals};
@@ -62,7 +62,7 @@ use stream::Stream;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DenseMesh {
     /// Vertices, in voxels from sample (0, 0, 0), the apron included. One for each lattice edge that the surface
-    /// crosses, in its middle where the difference between its two samples is no finite number.
+    /// crosses, in its middle where the difference between its two samples is not finite.
     pub positions: Vec<[f32; 3]>,
     /// Unit normals towards the air, one for each vertex; empty with [`Normals::None`].
     pub normals: Vec<[f32; 3]>,

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! So both samples of a cell's edge along x always lie in one word, and no bit is ever carried. The last sample of a
-//! row is repeated: the column that it starts is no cell, and no edge along x is crossed there. The last row is
+//! row is repeated: the column that it starts is not a cell, and no edge along x is crossed there. The last row is
 //! repeated as well.
 
 use super::density::Density;

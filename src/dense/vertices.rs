@@ -213,7 +213,7 @@ fn border_gradients<S: Density, const AXIS: usize>(
     gradients
 }
 
-/// Where the surface crosses edges, 0 to 1; in the middle where the samples' difference is no finite number.
+/// Where the surface crosses edges, 0 to 1; in the middle where the samples' difference is not finite.
 #[inline(always)]
 fn crossing([start, end]: [f32x4; 2]) -> f32x4 {
     let difference = start - end;

@@ -13,9 +13,9 @@ use crate::volume::{Brick, PRISTINE, Sample, SampleView, VoxelOutcome, column_ha
 pub(super) struct BrickEditor<'a> {
     pub view: SampleView<'a>,
     pub pos: BrickPos,
-    /// Its earlier state.
+    /// The brick before the edits.
     base: Option<&'a Brick>,
-    /// Its present state; `None` until its first sample changes.
+    /// The brick as edited so far; `None` until its first sample changes.
     brick: Option<Brick>,
     /// Heights of its columns.
     pub heights: [[i32; 8]; 8],
@@ -27,9 +27,9 @@ pub(super) struct BrickEditor<'a> {
 #[derive(Clone, Copy, Default)]
 pub(super) struct Changed {
     pub all: u64,
-    /// Those that were solid.
+    /// Changed samples that were solid.
     pub was: u64,
-    /// Those that are solid now.
+    /// Changed samples that are solid now.
     pub is: u64,
 }
 

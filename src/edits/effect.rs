@@ -58,7 +58,7 @@ impl EditEffect {
 #[derive(Clone, Debug)]
 pub(crate) struct DraftedBrick {
     pub pos: BrickPos,
-    /// Its new content.
+    /// The new content of the brick.
     pub brick: Arc<Brick>,
     /// Box around the samples that changed.
     pub changed: LatticeBox,
@@ -92,7 +92,7 @@ impl MergedBricks {
         }
     }
 
-    /// All of them, in order.
+    /// All bricks, in order.
     pub fn into_list(self) -> Vec<DraftedBrick> {
         self.0.into_values().collect()
     }

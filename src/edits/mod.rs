@@ -12,6 +12,7 @@
 
 mod batches;
 mod brick_editor;
+mod count_replaced;
 mod delta;
 mod drafter;
 mod effect;
@@ -23,11 +24,11 @@ mod prepared;
 mod prepared_edit;
 mod removal;
 mod reset;
-mod restore;
 mod rule_scope;
 mod stencil_edit;
 mod surface_distance;
 
+pub(crate) use count_replaced::count_replaced;
 pub(crate) use delta::EditDelta;
 #[cfg(feature = "cuda")]
 pub(crate) use delta::enter_effects;
@@ -41,6 +42,5 @@ pub(crate) use prepared_edit::max_read_around;
 pub(crate) use prepared_edit::{EDIT_WORK, edit_work, max_bricks, reach};
 pub(crate) use removal::take_out;
 pub(crate) use reset::{ResetBrick, edited_within, reset};
-pub(crate) use restore::count_replaced;
 #[cfg(feature = "cuda")]
 pub(crate) use {prepared_edit::PreparedEdit, rule_scope::BatchRules};

@@ -30,7 +30,7 @@ impl BrickEditor<'_> {
                     let row = self.paint((y, z), outside, lanes, material, counts);
                     layer | of_row(row, z)
                 }),
-                // They are no jobs: see `edits::reset` and `edits::paste`.
+                // These have no jobs of their own: see `edits::reset` and `edits::paste`.
                 Kind::Reset | Kind::Paste => 0,
                 _ => self.carve(y, rows, lanes, operation, counts),
             };

@@ -84,8 +84,8 @@ impl PreparedEdit {
     }
 }
 
-/// How far from the samples that it changes an edit with this kernel, or one that rules restrict, reads others, in voxels
-/// along each axis.
+/// How far from the samples that it changes an edit with this kernel, or one that rules restrict, reads others, in
+/// voxels along each axis.
 fn reads_around(sculptor: Option<&SculptKernel>) -> IVec3 {
     let rounding = sculptor.and_then(SculptKernel::rounding);
     let around = rounding.map_or(1, |rounding| margin(rounding.horizon()));
@@ -104,8 +104,8 @@ pub(crate) fn reach(grid: ChunkGrid, edit: &Edit) -> Option<LatticeBox> {
     edit.reach().intersection(grid.edit_bounds())
 }
 
-/// At least the number of bricks of a world that an edit may change: along paths far fewer than the bricks in its reach.
-/// `None` when it lies outside.
+/// At least the number of bricks of a world that an edit may change: along paths far fewer than the bricks in its
+/// reach. `None` when it lies outside.
 pub(crate) fn max_bricks(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let around = BrickPos::range(reach(grid, edit)?).volume();
     Some(edit.max_bricks().map_or(around, |most| most.min(around)))
@@ -116,8 +116,7 @@ pub(crate) const EDIT_WORK: u64 = 20;
 /// How many times as much work a brick is for an edit that sculpts: it reads a stencil around each sample.
 const SCULPTED: u64 = 4;
 
-/// The work of an edit, in bricks: what queues limit, and what servers charge. `None` for an edit that reaches nothing of the
-/// world.
+/// The work of an edit, in bricks: what queues limit, and what servers charge. `None` for an edit outside the world.
 pub(crate) fn edit_work(grid: ChunkGrid, edit: &Edit) -> Option<u64> {
     let weight = if edit.kind() == Kind::Sculpt { SCULPTED } else { 1 };
     Some(EDIT_WORK + weight * max_bricks(grid, edit)?)

@@ -1,11 +1,11 @@
 //! How far the samples of a brick are from the surface of the ground, for edits that round the edge between it and a
 //! shape.
 //!
-//! Densities do not say that: pristine ones are heights above the ground, and digs and adds store distances within a few
-//! voxels only. Samples next to the surface know it from where it crosses the edges of their cells; from there distances
-//! go from neighbour to neighbour, through ground for solid samples and through air for others. They are exact next to the
-//! surface, elsewhere at most 9 % and 0.43 voxels too large, and depend on nothing but the samples within the distance:
-//! not on where bricks begin.
+//! Densities do not say that: pristine ones are heights above the ground, and digs and adds store distances within a
+//! few voxels only. Samples next to the surface know it from where it crosses the edges of their cells; from there
+//! distances go from neighbour to neighbour, through ground for solid samples and through air for others. They are
+//! exact next to the surface, elsewhere at most 9 % and 0.43 voxels too large, and depend on nothing but the samples
+//! within the distance: not on where bricks begin.
 
 use glam::IVec3;
 
@@ -25,12 +25,12 @@ pub(super) fn margin(horizon: i32) -> i32 {
 
 /// The distance of a brick's samples to the surface of the ground, in 1/256 voxel, up to a horizon.
 pub(super) struct SurfaceDistance {
-    /// Of the brick's samples, in the order of bricks.
+    /// Distances of the brick's samples, in the order of bricks.
     distances: Vec<i32>,
 }
 
 impl SurfaceDistance {
-    /// Those of a brick. Beyond the world's rim, everything continues as at the rim.
+    /// Computes the distances of a brick's samples. Beyond the world's rim, everything continues as at the rim.
     pub fn new(view: &SampleView, pos: BrickPos, horizon: i32) -> Self {
         let around = pos.samples().grown(margin(horizon));
         let all = densities(view, around);
@@ -111,7 +111,8 @@ impl Field {
             let first = ((number / (depth - 2) + 1) * depth + number % (depth - 2) + 1) * width + 1;
             let kinds = &self.kinds[first..][..inner];
             row.copy_from_slice(&self.distances[first..][..inner]);
-            // Of the rows next to it, those that come before this one or after it: how many rows apart, and along how many axes.
+            // Of the rows next to it, those that come before this one or after it: how many rows apart, and along how
+            // many axes.
             for (apart, axes) in [(1, 1), (depth - 1, 2), (depth, 1), (depth + 1, 2)] {
                 let other = if is_forward { first - apart * width } else { first + apart * width };
                 for (other, length) in
@@ -181,8 +182,8 @@ fn densities(view: &SampleView, around: LatticeBox) -> Vec<i32> {
     all
 }
 
-/// The distance of a sample to the plane through the points where the surface crosses the edges to its neighbours; `None`
-/// if it crosses none of them.
+/// The distance of a sample to the plane through the points where the surface crosses the edges to its neighbours;
+/// `None` if it crosses none of them.
 fn to_crossings(all: &[i32], index: usize, strides: [isize; 3]) -> Option<i32> {
     let own = all[index];
     let along = strides.map(|stride| {

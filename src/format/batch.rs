@@ -32,7 +32,8 @@ const GROUND: u8 = 4;
 /// A sequence of commits, and the game's data up to the last of them.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Commits in order. A change is stored only with an entry [`LogEntry::Change`]; changes of edits are computed again.
+    /// Commits in order. A change is stored only with an entry [`LogEntry::Change`]; changes of edits are computed
+    /// again.
     pub commits: Vec<CommitRecord>,
     /// Changes of the game's data, in order; `None` if it removed a key.
     pub game: Vec<(String, Option<Vec<u8>>)>,
@@ -44,7 +45,7 @@ impl Batch {
         self.commits.is_empty() && self.game.is_empty()
     }
 
-    /// Its bytes, with the content of edits in each of them. A batch with a commit that sets
+    /// Encodes the batch, with the content of edits in each of them. A batch with a commit that sets
     /// another [ground](Order::Ground) is refused when it is read: a log ends there.
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -126,7 +127,7 @@ impl Batch {
 /// With names in place of content, as journals have it.
 #[cfg(feature = "store")]
 impl Batch {
-    /// Its bytes like those of [`encode`](Self::encode), but with names in the place of content: all names come first,
+    /// Encodes the batch like [`encode`](Self::encode), but with names in the place of content: all names come first,
     /// where [`names`](Self::names) finds them.
     pub(crate) fn encode_named(&self) -> Vec<u8> {
         let mut bytes = Vec::new();

@@ -27,7 +27,7 @@ const MAX_BRICKS: usize = 512;
 
 /// All samples are edited.
 const WHOLE: u8 = 1;
-/// All are of one density, which follows.
+/// All samples have one density, which follows.
 const FLAT: u8 = 2;
 /// Materials are stored.
 const MATERIALS: u8 = 4;

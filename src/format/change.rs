@@ -1,4 +1,4 @@
-//! The encoding of replaced parts: bricks by regions, pristine ones by position only, and fields.
+//! The encoding of patches: bricks by regions, pristine ones by position only, and fields.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -4,7 +4,7 @@
 //! | --- | --- |
 //! | 4 | [`MAGIC`] |
 //! | 4 | length of the head, little-endian |
-//! | length | the head, a [frame](super::frame) that names length and checksum of each other one |
+//! | length | the head, a [frame](super::frame) listing the length and checksum of every other frame |
 //! | | the other frames |
 //!
 //! The first three are the same in every schema.
@@ -65,7 +65,7 @@ pub fn write(
 /// Takes a file apart.
 ///
 /// # Errors
-/// When it is no file of this kind, when it is cut off, when a frame is not the one that the head names, or when the
+/// When it is not a file of this kind, when it is cut off, when a frame is not the one that the head names, or when the
 /// head has more bytes than `limit`.
 pub fn read(kind: Kind, file: &[u8], limit: usize) -> Result<Container<'_>, FormatError> {
     let (world, head, mut rest) = read_head(kind, file, limit)?;

@@ -3,8 +3,8 @@
 //! The serialised form of an [`Edit`] is cut into shape, middle, what lies between, tag and stroke. Bits of a head say
 //! which of them are as before; it is below 128. Reading joins them again and deserialises the result, which checks it.
 //!
-//! An edit with content, such as a stamp, is [`NAMED`]: it has placeholders, and the names of its content follow. Earlier
-//! journals and portable worlds hold content whole.
+//! An edit with content, such as a stamp, is [`NAMED`]: it has placeholders, and the names of its content follow.
+//! Earlier journals and portable worlds hold content whole.
 
 use super::bytes::{Reader, put_bytes, put_number, put_signed};
 use super::contents::{ContentTable, Resolved, named};

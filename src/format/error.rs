@@ -9,16 +9,16 @@ use crate::lattice::{BrickPos, ChunkPos};
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum FormatError {
-    /// They don't begin like a record.
+    /// The bytes do not begin like a record.
     #[error("these bytes are not a record of a saved world")]
     Magic,
-    /// They end too early.
+    /// The record is cut off.
     #[error("the record is cut off")]
     Truncated,
-    /// They changed since they were written.
+    /// The record changed after it was written.
     #[error("the record is damaged: its checksum differs")]
     Checksum,
-    /// They were written by a newer version of the crate.
+    /// A newer version of the crate wrote the record.
     #[error(
         "the record has schema {found}, but this version knows schemas up to {known}: use a newer version"
     )]
@@ -28,7 +28,7 @@ pub enum FormatError {
         /// The newest that this version knows.
         known: u32,
     },
-    /// They hold something else.
+    /// The record is of another kind.
     #[error("the record is of kind {found}, not {expected:?}")]
     Kind {
         /// The number of the record's kind.
@@ -36,7 +36,7 @@ pub enum FormatError {
         /// What was asked for.
         expected: Kind,
     },
-    /// They belong to another world.
+    /// The record belongs to another world.
     #[error("the record belongs to the world {found}, not to {expected}")]
     World {
         /// The record's world.
@@ -44,10 +44,10 @@ pub enum FormatError {
         /// The one that was asked for.
         expected: WorldId,
     },
-    /// They belong in another place of the same world.
+    /// The record belongs elsewhere in the same world.
     #[error("the record belongs in another place: it has another key")]
     Key,
-    /// They declare more content than is allowed.
+    /// The record declares more content than is allowed.
     #[error("the record declares {length} bytes, but {limit} are allowed")]
     TooLarge {
         /// Bytes of the content.
@@ -55,7 +55,7 @@ pub enum FormatError {
         /// The most allowed.
         limit: u64,
     },
-    /// They are valid by their checksum, but what they hold is not.
+    /// The checksum is valid, but the content is not.
     #[error("the record holds an invalid {0}")]
     Invalid(&'static str),
     /// A brick is invalid.
@@ -75,7 +75,7 @@ pub enum FormatError {
     File {
         /// The file's name.
         name: String,
-        /// What is wrong with it.
+        /// What is wrong with the file.
         why: String,
     },
 }

@@ -52,7 +52,7 @@ pub struct Opened {
     /// Whether its content names [other content](super::contents), as since schema 2.
     #[cfg_attr(not(feature = "store"), allow(dead_code, reason = "for journals"))]
     pub is_named: bool,
-    /// Its content.
+    /// The frame's content.
     pub payload: Vec<u8>,
 }
 
@@ -61,7 +61,7 @@ pub struct Opened {
 pub struct Peeked<'a> {
     /// The world that it belongs to.
     pub world: WorldId,
-    /// Its place in that world.
+    /// The frame's place in that world.
     pub key: &'a [u8],
     /// How many bytes it takes.
     pub length: usize,

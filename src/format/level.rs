@@ -1,8 +1,8 @@
 //! The format of levels: a folder of files for version control, or one packed file to ship.
 //!
 //! - `level.json` describes the level, and names its regions.
-//! - `r.X.Y.Z.region` holds a region's bricks and fields. It has neither revision nor time, so it changes only with its content,
-//!   and is not packed, so that version control can store differences.
+//! - `r.X.Y.Z.region` holds a region's bricks and fields. It has neither revision nor time, so it changes only with its
+//!   content, and is not packed, so that version control can store differences.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -68,7 +68,7 @@ impl Level {
         Self { settings, ground: ground.hash(), next_field, edit_settings, game, regions }
     }
 
-    /// Its parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
+    /// The level's parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
     pub fn parts(&self) -> WorldParts {
         let change = of_regions(&self.regions, self.next_field);
         let (chunk_size, edit_settings) = (self.settings.chunk_size, self.edit_settings.clone());

@@ -18,7 +18,7 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    /// Those of the format.
+    /// The limits of the format.
     pub const FORMAT: Self = Self {
         head: 256 << 20,
         region: 8 << 20,

@@ -13,7 +13,7 @@ pub struct Metadata {
     pub settings: TerrainSettings,
     /// The world's revision.
     pub revision: u64,
-    /// Its hash.
+    /// The world's hash.
     pub hash: u64,
     /// The greatest name that a field has had.
     pub next_field: u64,
@@ -28,7 +28,7 @@ pub struct Metadata {
 }
 
 impl Metadata {
-    /// Its bytes.
+    /// Encodes the metadata.
     pub fn encode(&self) -> Vec<u8> {
         plain::to_bytes(self)
     }

@@ -6,12 +6,11 @@ use super::error::FormatError;
 
 /// The bytes of a value.
 pub fn to_bytes<T: Serialize + ?Sized>(value: &T) -> Vec<u8> {
-    // It fails for sequences of unknown length and maps of such only, which no record holds; reading nothing is an
-    // error.
+    // It fails only for sequences and maps of unknown length, which no record contains; empty bytes fail to decode.
     postcard::to_stdvec(value).unwrap_or_default()
 }
 
-/// The value of bytes, all of which it takes.
+/// Decodes a value that must use all of the bytes.
 pub fn from_bytes<'a, T: Deserialize<'a>>(bytes: &'a [u8], what: &'static str) -> Result<T, FormatError> {
     match postcard::take_from_bytes(bytes) {
         Ok((value, [])) => Ok(value),

@@ -24,7 +24,7 @@ pub struct SavedRegion {
     pub revision: u64,
     /// The [hash](Ground::region_hash) of the ground that it was saved over.
     pub ground_hash: u64,
-    /// Its bricks, in order.
+    /// The region's bricks, in order.
     pub bricks: Vec<(BrickPos, Arc<Brick>)>,
     /// The fields of the chunks whose lowest corners lie in it, in order.
     pub fields: Vec<(ChunkPos, Fields)>,
@@ -86,7 +86,7 @@ impl PortableWorld {
         }
     }
 
-    /// Its parts, of which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
+    /// The world's parts, of which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
     pub fn parts(&self) -> WorldParts {
         let Metadata { settings, revision, next_field, edit_settings, .. } = &self.metadata;
         let change = of_regions(&self.regions, *next_field);
@@ -214,7 +214,7 @@ pub(crate) fn read_within(
 /// needed.
 ///
 /// # Errors
-/// When it is no portable file, or when its head is damaged.
+/// When it is not a portable file, or when its head is damaged.
 pub fn read_portable_head(file: &[u8]) -> Result<(WorldId, PortableHead), FormatError> {
     let (world, own) = container::read_own(Kind::Portable, file, Limits::FORMAT.head)?;
     Ok((world, portable_head(&own)?))

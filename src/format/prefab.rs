@@ -29,7 +29,7 @@ pub(crate) fn packed_prefab(prefab: &Prefab) -> &Arc<[u8]> {
 /// Reads what [`write_prefab`] wrote.
 ///
 /// # Errors
-/// When the bytes are no prefab's, when they were cut off or changed, or when a newer version wrote them. Memory is
+/// When the bytes are not a prefab, when they were cut off or changed, or when a newer version wrote them. Memory is
 /// bounded by some 100 MiB, whatever they say.
 pub fn read_prefab(bytes: &[u8]) -> Result<Prefab, FormatError> {
     let opened = frame::open(bytes, Kind::Prefab, WorldId::default(), KEY, LIMIT)?;

@@ -35,7 +35,7 @@ pub enum MaterialControl {
         overlay: MaterialId,
     },
     /// By a map of ids: each column's overlay is the id in the nearest sample, and covers the base fully. An id is the
-    /// grey level of an 8-bit image, or the high byte of a 16-bit one; 255 is none.
+    /// grey level of an 8-bit image, or the high byte of a 16-bit one; 255 means no overlay.
     Ids {
         /// The map.
         map: GreyImage,

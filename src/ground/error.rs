@@ -29,7 +29,7 @@ pub enum GroundError {
         /// Cells along z.
         depth: u32,
     },
-    /// A height is no number, or too far from zero for the lattice.
+    /// A height is not a number, or too far from zero for the lattice.
     #[error("the height at column ({x}, {z}) is {value} voxels: it must lie within -{LIMIT} to {LIMIT}")]
     Height {
         /// Column along x.
@@ -66,7 +66,7 @@ pub enum GroundError {
         name: Cow<'static, str>,
         /// The value given.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         allowed: &'static str,
     },
     /// The machine has too little memory for the world.
@@ -143,10 +143,10 @@ pub enum ImageError {
         unit: &'static str,
         /// How many the dimensions ask for.
         expected: u64,
-        /// Their number.
+        /// The number of bytes or samples that were given.
         actual: u64,
     },
-    /// The file is no PNG, is damaged, or uses something that the decoder does not know.
+    /// The file is not a PNG, is damaged, or uses something that the decoder does not know.
     #[error("the image cannot be decoded: {reason}")]
     Decode {
         /// The decoder's own words.

@@ -104,8 +104,8 @@ pub(super) const ORIGIN: [f64; 2] = [0.37, 0.71];
 /// A sum of octaves of Perlin's gradient noise, of checked parameters.
 pub(super) enum Octaves {
     Fractal(Fbm<Perlin>),
-    /// It starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that every ridged noise
-    /// has at its own origin, counted from -1.
+    /// Ridged noise, which starts at -1 but ends anywhere from 0.3 to 1.5, depending on the octaves: at the peak that
+    /// every ridged noise has at its own origin, counted from -1.
     Ridged(RidgedMulti<Perlin>, f64),
 }
 

@@ -35,7 +35,7 @@ impl Coordinates {
         Self([along(low.x, width, ground.width()), along(low.z, depth, ground.depth())])
     }
 
-    /// Those of the neighbours along an axis, a step on.
+    /// The coordinates of the neighbours, one step along an axis.
     fn beside(&self, ground: &Ground, axis: usize, step: i32) -> Self {
         let Self([x, z]) = self;
         let beside = |list: &[i32], last: i32| list.iter().map(|at| (at + step).clamp(0, last)).collect();
@@ -73,7 +73,7 @@ impl Ground {
         }
     }
 
-    /// Their heights alone, in 1/256 voxel.
+    /// Heights of a page's columns, in 1/256 voxel.
     pub(crate) fn page_heights(&self, low: Column, stride: i32, count: [usize; 2]) -> Vec<i32> {
         let columns = Coordinates::new(self, low, stride, count);
         // Every other column is a quarter of them: cheaper than whole pages, which heights with normals would need.

@@ -35,7 +35,7 @@ pub(super) struct Page {
     place: Place,
     /// Row by row, from `BEFORE` columns before the page's first one on. Columns beyond the rim are like those on it.
     heights: Box<[i32]>,
-    /// Of the page's own columns: what they are made of, and the material of the highest solid voxel, where these
+    /// Materials of the page's own columns, the material of the highest solid voxel, where these
     /// differ from column to column; and which cells are steep, a word for 8x8 of them. Each is computed when it is
     /// first needed.
     pub materials: OnceLock<Box<[ColumnMaterial]>>,

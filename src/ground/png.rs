@@ -32,7 +32,8 @@ impl<'a> Png<'a> {
     /// Reads everything before the samples. The caller keeps `bytes_per_pixel` bytes for each pixel.
     ///
     /// # Errors
-    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, one without samples, or one that is no PNG.
+    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, one without samples, or one that is not
+    ///   a PNG.
     /// - [`ImageError::Dimensions`], [`ImageError::Memory`] for one over the limits, before memory is allocated for it.
     pub fn open(bytes: &'a [u8], limits: &ImageLimits, bytes_per_pixel: u64) -> Result<Self, ImageError> {
         let failed = |error| failed(error, bytes.len() as u64);
@@ -107,7 +108,7 @@ impl GreyImage {
     /// heights, not light.
     ///
     /// # Errors
-    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, or one that is no PNG.
+    /// - [`ImageError::Truncated`], [`ImageError::Decode`] for a damaged file, or one that is not a PNG.
     /// - [`ImageError::ColorType`] for colour, palettes, alpha or fewer than 8 bits.
     /// - [`ImageError::Empty`] for an image without samples.
     /// - [`ImageError::FileSize`], [`ImageError::Dimensions`], [`ImageError::Memory`] for one over the limits, before

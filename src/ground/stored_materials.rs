@@ -10,7 +10,7 @@ use super::material::ColumnMaterial;
 pub enum Materials {
     Uniform(ColumnMaterial),
     Columns(Vec<ColumnMaterial>),
-    /// Of a ground with a source: computed when it is asked for. Without a control they are the source's.
+    /// Materials of a ground with a source, computed when they are needed. Without a control they are the source's.
     OnDemand(Option<Box<MaterialControl>>),
 }
 
@@ -31,7 +31,7 @@ impl Materials {
         }
     }
 
-    /// Those of some columns, one after the other; where they are computed on demand, these here.
+    /// The materials of some columns, one after the other: from `on_demand` where they are computed on demand.
     pub fn of<'a>(
         &'a self,
         indices: Range<usize>,

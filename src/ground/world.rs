@@ -31,7 +31,7 @@ pub struct Ground {
     pages: Option<Box<Pages>>,
 }
 
-/// Of sources, and of what they are made of, only their ids are compared.
+/// Compares sources only by their ids.
 impl PartialEq for Ground {
     fn eq(&self, other: &Self) -> bool {
         let source = |ground: &Self| ground.source().map(HeightSource::id);
@@ -47,9 +47,9 @@ impl PartialEq for Ground {
 #[derive(Default)]
 pub(crate) struct RowBuffer {
     pub(super) normals: Vec<Vec3>,
-    /// Of grounds with a source.
+    /// Heights, for grounds with a source.
     pub(super) heights: Vec<i32>,
-    /// Of grounds with a source, unless all columns are alike.
+    /// Materials, for grounds with a source, unless all columns are alike.
     pub(super) materials: Vec<ColumnMaterial>,
 }
 

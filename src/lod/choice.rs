@@ -16,7 +16,7 @@ const AXIS_STEPS: usize = 20;
 /// The least share of limits at which a node stays split: with none, nothing would ever be merged.
 const LEAST_STAY: f32 = 0.01;
 
-/// The most often they grow: by then they are so large that only nodes around an eye are split.
+/// The maximum number of times that limits grow: by then they are so large that only nodes around an eye are split.
 const MAX_GROWTHS: u32 = 60;
 
 /// A viewpoint that the level of detail is chosen for.
@@ -99,7 +99,7 @@ impl Viewpoint {
 /// The properties of a node that a choice depends on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct NodeFacts {
-    /// Its lowest and its highest point, in voxels.
+    /// The node's lowest and highest point, in voxels.
     pub heights: [f32; 2],
     /// Greatest distance from the finer surface, in voxels.
     pub error: f32,

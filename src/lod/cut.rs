@@ -10,8 +10,8 @@ use crate::lattice::TilePos;
 /// Nodes that together cover the world once. Those that share an edge differ by at most one level; across a corner they
 /// may differ by more.
 ///
-/// It is kept as the set of nodes that are split. A node of the cut is one that is not split, of a parent that is. Clones share
-/// the set until one of them changes, so that an unchanged cut is copied and compared at no cost.
+/// It is kept as the set of nodes that are split. A node of the cut is one that is not split, of a parent that is.
+/// Clones share the set until one of them changes, so that an unchanged cut is copied and compared at no cost.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cut {
     grid: LodGrid,

@@ -8,7 +8,7 @@ const MAX_LEVELS: u8 = 10;
 /// A square of the world that is drawn at one level of detail: a node of the quadtree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Node {
-    /// Its cells are 2^`level` voxels wide.
+    /// The level of detail: cells are 2^`level` voxels wide.
     pub level: u8,
     /// Along +x, in units of the node's width.
     pub x: i32,
@@ -25,7 +25,7 @@ impl Node {
         Self { level, x: tile.x >> level, z: tile.z >> level }
     }
 
-    /// Its lowest tile.
+    /// The node's lowest tile.
     pub const fn tile(self) -> TilePos {
         TilePos { x: self.x << self.level, z: self.z << self.level }
     }

@@ -1,21 +1,21 @@
 //! Loose pieces: ground that digging cut off from the world.
 //!
-//! **Connected** are solid samples that are neighbours along an axis, six for each sample. The surface connects the same
-//! ones: its [case table](crate::surface::cases) puts no vertex on an edge between two solid samples, and separates
+//! **Connected** are solid samples that are neighbours along an axis, six for each sample. The surface connects the
+//! same ones: its case table (`surface::cases`) puts no vertex on an edge between two solid samples, and separates
 //! solid corners that only meet across a diagonal. So two samples belong to one piece of ground exactly if a path
 //! inside the drawn surface connects them.
 //!
 //! **Anchored** is a piece that reaches ground below everything that was ever edited. The world's sides anchor
-//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further. Its
+//! nothing. A piece of more than [`LooseSettings::largest`] voxels counts as anchored without looking further. The
 //! result does not depend on the order of the search.
 //!
-//! **Budget.** The search after an edit visits a bounded number of bricks, and what it finds has a bounded number of voxels:
-//! see [`LooseSettings`]. Pieces beyond these bounds stay as ground, and the receipt reports it. Seeds are taken in a
-//! fixed order, so the outcome is the same on every machine.
+//! **Budget.** The search after an edit visits a bounded number of bricks, and what it finds has a bounded number of
+//! voxels: see [`LooseSettings`]. Pieces beyond these bounds stay as ground, and the receipt reports it. Seeds are
+//! taken in a fixed order, so the outcome is the same on every machine.
 //!
-//! **Removal.** The samples of a removed piece get the density of air in the middle of a dig, and so does air that touches
-//! them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this belongs
-//! to the edit that cut the piece off: it is hashed, undone and replayed with it.
+//! **Removal.** The samples of a removed piece get the density of air in the middle of a dig, and so does air that
+//! touches them and no other ground, so that nothing of the shape is left. Other vertices keep their bits. All of this
+//! belongs to the edit that cut the piece off: it is hashed, undone and replayed with it.
 
 mod bits;
 mod mesh;

@@ -14,12 +14,12 @@ use crate::volume::{MaterialCounts, SampleView};
 /// What happened to a loose piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum PieceFate {
-    /// It stays where it is. So does every piece of which the terrain's [`DiggingRules`](crate::volume::DiggingRules)
-    /// protect a part.
+    /// The piece stays where it is. So does every piece of which the terrain's
+    /// [`DiggingRules`](crate::volume::DiggingRules) protect a part.
     Left,
-    /// It was taken out of the ground.
+    /// The piece was taken out of the ground.
     Removed,
-    /// It was taken out of the ground, and its mesh is there to make a body of.
+    /// The piece was taken out of the ground, and its mesh is there to make a body of.
     BrokeOff,
 }
 
@@ -60,33 +60,33 @@ pub struct Run {
 #[serde(from = "Plain", into = "Plain")]
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct LoosePiece {
-    /// Its id. A saved piece does not store it, because it follows from `runs` and `materials`.
+    /// The piece's id. A saved piece does not store it, because it follows from `runs` and `materials`.
     pub id: PieceId,
-    /// What happened to it.
+    /// What happened to the piece.
     pub fate: PieceFate,
-    /// Box around its samples.
+    /// Box around the piece's samples.
     pub bounds: LatticeBox,
-    /// How many samples it has.
+    /// Number of samples.
     pub voxels: u64,
-    /// Its voxels by material: times the density and volume of a voxel, its mass.
+    /// Voxels by material: multiplied by density and volume of a voxel, they give the mass.
     pub materials: MaterialCounts,
-    /// Its samples, by y, then z, then x.
+    /// The piece's samples, by y, then z, then x.
     pub runs: Arc<[Run]>,
-    /// Its surface as marching cubes draws it, closed, with positions counted from the lowest corner of `bounds`; for
-    /// those that broke off.
+    /// The closed surface, as marching cubes draws it, with positions counted from the lowest corner of `bounds`; only
+    /// for pieces that broke off.
     pub mesh: Option<Arc<SurfaceMesh>>,
 }
 
 /// A piece that came back: what an undo restored as ground.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReturnedPiece {
-    /// The id that it had when it was cut off.
+    /// The id that the piece had when it was cut off.
     pub id: PieceId,
     /// The tag of the brush that had cut it off; 0 where players share the terrain.
     pub tag: u64,
-    /// What had happened to it then: [`PieceFate::Removed`] or [`PieceFate::BrokeOff`].
+    /// What happened to the piece when it was cut off: [`PieceFate::Removed`] or [`PieceFate::BrokeOff`].
     pub fate: PieceFate,
-    /// Its voxels by material.
+    /// The piece's voxels by material.
     pub materials: MaterialCounts,
 }
 

@@ -1,7 +1,8 @@
 //! The edges that a tile shares with the tiles around it.
 //!
-//! Both tiles compute the same line along their border: from the floors on it, and from which cells on both sides are walkable.
-//! Vertices in between are put on that line, so edges of both tiles lie in it, wherever their polygons begin and end.
+//! Both tiles compute the same line along their border: from the floors on it, and from which cells on both sides are
+//! walkable. Vertices in between are put on that line, so edges of both tiles lie in it, wherever their polygons begin
+//! and end.
 
 use rustc_hash::FxHashMap;
 

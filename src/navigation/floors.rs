@@ -31,7 +31,7 @@ type Found = (u32, i32, i32);
 /// The 8x8 columns of a stack of bricks.
 struct Stack<'a> {
     heights: [[i32; 8]; 8],
-    /// Those of its columns that are wanted: bit `z * 8 + x`.
+    /// The columns that are wanted: bit `z * 8 + x`.
     wanted: u64,
     /// The height of the floor below the air that a column is in.
     open: [i32; 64],

@@ -1,18 +1,19 @@
 //! Links over ledges, where agents jump down or climb up.
 //!
-//! A link leads from a walkable cell straight ahead, along x or z, to the first walkable cell beyond the ledge that lies
-//! lower. It exists if
+//! A link leads from a walkable cell straight ahead, along x or z, to the first walkable cell beyond the ledge that
+//! lies lower. It exists if
 //!
 //! 1. the cell next to the upper one is not walkable, as far as an agent can walk there;
-//! 2. the landing is lower by more than a step, by no more than the agent jumps or climbs, and not farther than it leaps;
+//! 2. the landing is lower by more than a step, by no more than the agent jumps or climbs, and not farther than it
+//!    leaps;
 //! 3. no walkable cell as high as the upper one lies between them;
-//! 4. the air is free for a box as wide as the cells that the agent touches: from its feet on the ledge to its head all the
-//!    way over, and from the landing up to there above the cells that it touches there, but for those towards the wall.
-//!    Ground up to the height that it climbs from one column to the next does not count as in the way, and air lower than the
-//!    agent counts as none.
+//! 4. the air is free for a box as wide as the cells that the agent touches: from its feet on the ledge to its head all
+//!    the way over, and from the landing up to there above the cells that it touches there, but for those towards the
+//!    wall. Ground up to the height that it climbs from one column to the next does not count as in the way, and air
+//!    lower than the agent counts as none.
 //!
-//! So the agent leaps as high as it stands and then falls straight down. Links side by side become one, as far as both their
-//! edges are straight within the [precision](super::WalkSettings::precision).
+//! So the agent leaps as high as it stands and then falls straight down. Links side by side become one, as far as both
+//! their edges are straight within the [precision](super::WalkSettings::precision).
 
 use glam::IVec3;
 
@@ -54,8 +55,8 @@ struct Leap {
 const WAYS: [(Axis, i32); 4] = [(Axis::X, 1), (Axis::X, -1), (Axis::Z, 1), (Axis::Z, -1)];
 
 impl WalkableTile {
-    /// The links over ledges from the walkable cells of the tile; their landings may lie in other tiles. They are in order of
-    /// the tile's rows, one way after the other.
+    /// The links over ledges from the walkable cells of the tile; their landings may lie in other tiles. They are in
+    /// order of the tile's rows, one way after the other.
     pub fn ledges(&self) -> Vec<LedgeLink> {
         let Some(rules) = self.ledges else { return Vec::new() };
         let mut links = Vec::new();

@@ -18,7 +18,7 @@ pub(super) enum Axis {
 pub(super) struct Links {
     /// For each floor, the linked one towards +x and the one towards +z; [`NONE`] where there is none.
     next: [Vec<u32>; 2],
-    /// Those towards -x and -z.
+    /// For each floor, the linked ones towards -x and -z.
     last: [Vec<u32>; 2],
     /// Whether the cell with this floor at its lowest corner is passable.
     passable: Vec<bool>,

@@ -1,19 +1,21 @@
 //! Where agents can walk: floors, caves and bridges, tile by tile.
 //!
-//! A [`WalkableTile`] is computed from the samples of a world in integers, so it is the same on every machine, for every chunk
-//! size and level of detail, and nothing of it is saved or sent. It holds the *cells* (squares between four columns) on which an
-//! agent of some [`WalkSettings`] can stand. There may be several above each other.
+//! A [`WalkableTile`] is computed from the samples of a world in integers, so it is the same on every machine, for
+//! every chunk size and level of detail, and nothing of it is saved or sent. It holds the *cells* (squares between four
+//! columns) on which an agent of some [`WalkSettings`] can stand. There may be several above each other.
 //!
 //! 1. A **floor** is where a column leaves the ground upwards, with air of the agent's height above it.
-//! 2. Floors of neighbouring columns are **linked** if the agent can step or walk from one to the other, below both ceilings.
+//! 2. Floors of neighbouring columns are **linked** if the agent can step or walk from one to the other, below both
+//!    ceilings.
 //! 3. A cell is **passable** if its four corners have floors that are linked all around, and it is not too steep.
-//! 4. A cell is **walkable** if all cells that the agent touches while it stands anywhere on it are passable, and belong to the
-//!    world.
+//! 4. A cell is **walkable** if all cells that the agent touches while it stands anywhere on it are passable, and
+//!    belong to the world.
 //!
 //! With [`WalkSettings::jump_down`] or [`climb_up`](WalkSettings::climb_up), its [`ledges`](WalkableTile::ledges) lead
 //! from walkable cells to lower ones beyond a ledge, and back.
 //!
-//! Its [`polygons`](WalkableTile::polygons) are convex, share their edges, and meet those of the next tile in the same line.
+//! Its [`polygons`](WalkableTile::polygons) are convex, share their edges, and meet those of the next tile in the same
+//! line.
 //!
 //! ```
 //! use bevy_burrow::navigation::{NavTilePos, WalkSettings, WalkableTile, Walker};

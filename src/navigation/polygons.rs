@@ -8,11 +8,11 @@ use super::tiles::{NAV_TILE, NavTilePos};
 use super::walkable::WalkableTile;
 use crate::lattice::SNAP;
 
-/// Convex polygons that cover the walkable cells of a tile: rectangles seen from above, with further vertices on their sides
-/// where other rectangles begin.
+/// Convex polygons that cover the walkable cells of a tile: rectangles seen from above, with further vertices on their
+/// sides where other rectangles begin.
 ///
-/// Two polygons that meet have an edge in common. Polygons at the tile's border have edges in the same lines as those of the next
-/// tile, whose ends may lie elsewhere on it.
+/// Two polygons that meet have an edge in common. Polygons at the tile's border have edges in the same lines as those
+/// of the next tile, whose ends may lie elsewhere on it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct NavPolygons {
     pos: NavTilePos,

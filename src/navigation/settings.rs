@@ -7,8 +7,8 @@ use crate::lattice::ONE;
 #[cfg_attr(feature = "plugin", derive(bevy::prelude::Reflect))]
 #[serde(default, deny_unknown_fields)]
 pub struct WalkSettings {
-    /// How far the agent keeps from walls, edges and steep ground; 0 to 16. It is kept in whole cells: an agent of up to 0.7
-    /// voxels needs three cells of width, of which it walks on the middle one.
+    /// How far the agent keeps from walls, edges and steep ground; 0 to 16. It is kept in whole cells: an agent of up
+    /// to 0.7 voxels needs three cells of width, of which it walks on the middle one.
     pub radius: f32,
     /// Free height that it needs; more than 0, at most 256.
     pub height: f32,
@@ -22,8 +22,8 @@ pub struct WalkSettings {
     pub jump_down: f32,
     /// The highest ledge that it climbs up, where it does not walk; 0 to 256. With 0 it climbs none.
     pub climb_up: f32,
-    /// How far from the ledge it lands, or climbs up from, at most; 0 to 16. It is kept in whole cells, and the distance that the
-    /// agent keeps from walls and edges is not counted.
+    /// How far from the ledge it lands, or climbs up from, at most; 0 to 16. It is kept in whole cells, and the
+    /// distance that the agent keeps from walls and edges is not counted.
     pub leap: f32,
 }
 
@@ -69,7 +69,7 @@ pub enum WalkError {
     OutOfRange {
         /// The field of [`WalkSettings`].
         name: &'static str,
-        /// Its value.
+        /// The value of the field.
         value: f32,
         /// The least value.
         least: f32,
@@ -135,8 +135,8 @@ impl Walker {
         })
     }
 
-    /// How far, in columns along x and z, the ground may lie that decides whether a cell is walkable, and where its links over
-    /// ledges lead.
+    /// How far, in columns along x and z, the ground may lie that decides whether a cell is walkable, and where its
+    /// links over ledges lead.
     pub fn reach(&self) -> i32 {
         self.reach.len() as i32 + self.ledges.map_or(0, |ledges| ledges.cells + ledges.wide + 1)
     }
@@ -164,8 +164,9 @@ fn reach(radius: i32) -> Vec<i32> {
     rows.map(|z| (0..).take_while(|&x| touches(x + 1, z)).count() as i32).collect()
 }
 
-/// The square of the distance, in 1/256 voxel, from a cell to what may be in the way in the cell `x` and `z` cells further, if
-/// all nearer ones are passable: of a cell in the same row, all of it; of another one, the half at the farther corner.
+/// The square of the distance, in 1/256 voxel, from a cell to what may be in the way in the cell `x` and `z` cells
+/// further, if all nearer ones are passable: of a cell in the same row, all of it; of another one, the half at the
+/// farther corner.
 fn distance(x: i32, z: i32) -> i64 {
     let (least, most) = (i64::from(x.min(z)), i64::from(x.max(z)));
     let squared_one = i64::from(ONE).pow(2);

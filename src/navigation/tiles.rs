@@ -23,7 +23,7 @@ impl NavTilePos {
         Self { x: cell.x.div_euclid(NAV_TILE), z: cell.z.div_euclid(NAV_TILE) }
     }
 
-    /// Its lowest cell.
+    /// The tile's lowest cell.
     pub const fn origin(self) -> Column {
         Column::new(self.x.saturating_mul(NAV_TILE), self.z.saturating_mul(NAV_TILE))
     }

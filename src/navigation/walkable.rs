@@ -22,7 +22,7 @@ pub struct WalkableTile {
 /// A cell on which an agent can stand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct WalkableCell {
-    /// Its lowest column.
+    /// The cell's lowest column.
     pub cell: Column,
     /// Heights of the ground at its [corners](Column::corners), in 1/256 voxel.
     pub heights: [i32; 4],
@@ -47,7 +47,7 @@ impl WalkableTile {
         self.pos
     }
 
-    /// Its walkable cells, row by row, those above each other from below.
+    /// The tile's walkable cells, row by row; cells above each other from the lowest up.
     pub fn cells(&self) -> impl Iterator<Item = WalkableCell> {
         self.columns().flat_map(|(cell, _)| self.cells_of(cell))
     }
@@ -82,8 +82,8 @@ impl WalkableTile {
         self.floors.starts.len() * 4 + floors * (2 * 4 + 4 * 4 + 2)
     }
 
-    /// The stretches of air above floors, for a debug view: the floor's lattice column, its height and that of the ceiling, in
-    /// 1/256 voxel, if there is one.
+    /// The stretches of air above floors, for a debug view: the floor's lattice column, its height and that of the
+    /// ceiling, in 1/256 voxel, if there is one.
     pub fn spans(&self) -> impl Iterator<Item = (Column, i32, Option<i32>)> {
         self.columns().flat_map(move |(at, column)| {
             self.floors.of(column).map(move |floor| {
@@ -110,8 +110,8 @@ impl WalkableTile {
 fn erode(floors: &Floors, links: &Links, walker: &Walker) -> Vec<bool> {
     let count = floors.len();
     let most = walker.reach[0];
-    // How many cells in a row are passable before and after each one, up to the agent's reach. Floors are in order of their
-    // columns, so each is seen after the one before it.
+    // How many cells in a row are passable before and after each one, up to the agent's reach. Floors are in order of
+    // their columns, so each is seen after the one before it.
     let (mut before, mut after) = (vec![0u8; count], vec![0u8; count]);
     for floor in 0..count {
         if let Some(last) = links.last(floor, Axis::X)

@@ -102,7 +102,7 @@ impl Entry {
         Self::Order { by: None, order }
     }
 
-    /// What it asks of a terrain; `None` for a mark.
+    /// The order to a terrain; `None` for a mark.
     pub fn order(&self) -> Option<&Order> {
         if let Self::Order { order, .. } = self { Some(order) } else { None }
     }
@@ -117,7 +117,7 @@ impl Entry {
         if let Some(Order::Parts { change, .. }) = self.order() { Some(change) } else { None }
     }
 
-    /// Its sequence number at a client, if that client asked for it.
+    /// The entry's sequence number at a client, if that client sent it.
     pub(crate) fn number_of(&self, client: Option<ClientId>) -> Option<u64> {
         match self {
             Self::Order { by: Some((author, sequence)), .. } if Some(*author) == client => Some(*sequence),
@@ -131,7 +131,7 @@ impl Entry {
 pub struct Entries {
     /// The number of the first.
     pub first: u64,
-    /// All of them.
+    /// All of the entries.
     pub entries: Vec<Entry>,
 }
 
@@ -160,7 +160,7 @@ pub struct Hello {
     pub chunk_size: u32,
     /// The position that it has reached, if it has joined before.
     pub epoch: Option<Epoch>,
-    /// Where its player is, in voxels: regions come from there outwards.
+    /// Where the client's player is, in voxels: regions come from there outwards.
     pub position: IVec3,
 }
 
@@ -187,7 +187,7 @@ pub enum ToServer {
     },
     /// Undoes the last stroke of a client before this position among its edits.
     Undo {
-        /// Its sequence number among the client's edits and undos.
+        /// The undo's sequence number among the client's edits and undos.
         sequence: u64,
         /// The player whose stroke is undone.
         of: ClientId,
@@ -222,7 +222,7 @@ pub enum Join {
         /// The numbers of entries among them that the server could not apply: they do nothing.
         failed: Vec<u64>,
     },
-    /// All regions follow in the bulk lane. All others are pristine.
+    /// All stored regions follow in the bulk lane. All others are pristine.
     Regions {
         /// How many.
         regions: u32,
@@ -281,7 +281,7 @@ pub struct RegionContent {
     pub left: u32,
     /// The greatest name that a field has had.
     pub next_field: u64,
-    /// Its bricks.
+    /// The region's bricks.
     pub bricks: Vec<(BrickPos, Arc<Brick>)>,
     /// The fields of all chunks that have a sample in it; chunks that are not named have none.
     pub fields: Vec<(ChunkPos, Fields)>,
@@ -304,7 +304,7 @@ pub enum ToClient {
     },
     /// The server refused an edit or undo of the client.
     Refused {
-        /// Its sequence number.
+        /// The sequence number of the edit or undo.
         sequence: u64,
         /// Why.
         why: Refusal,
@@ -356,10 +356,10 @@ pub enum Refusal {
     /// The client's cost bucket is empty.
     #[error("too much at once")]
     Cost,
-    /// The game forbids it.
+    /// The game forbids the edit.
     #[error("not allowed")]
     Forbidden,
-    /// It lies outside the world.
+    /// The edit lies outside the world.
     #[error("outside the world")]
     OutsideWorld,
     /// The server has too much to do.
@@ -371,7 +371,7 @@ pub enum Refusal {
     /// Other players have changed the same parts since.
     #[error("others have dug there since")]
     Touched,
-    /// It is larger than edits may be, or than a message may be.
+    /// The edit is larger than edits may be, or than a message may be.
     #[error("too large")]
     TooLarge,
     /// The edit arrived before the client had joined.
@@ -386,25 +386,25 @@ pub enum Refusal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum KickReason {
-    /// It speaks another [`PROTOCOL`].
+    /// The client speaks another [`PROTOCOL`].
     #[error("client and server have different versions of the protocol")]
     Protocol,
-    /// It has another [`SIMULATION`](crate::terrain::SIMULATION).
+    /// The client has another [`SIMULATION`](crate::terrain::SIMULATION).
     #[error("client and server have different versions of the simulation")]
     Simulation,
-    /// It has another ground.
+    /// The client has another ground.
     #[error("client and server have different grounds")]
     Ground,
-    /// It has another chunk size.
+    /// The client has another chunk size.
     #[error("client and server have different chunk sizes")]
     ChunkSize,
-    /// It sent too many invalid messages.
+    /// The client sent too many invalid messages.
     #[error("too many invalid messages")]
     Malformed,
-    /// It sent far more than its budget.
+    /// The client sent far more than its budget.
     #[error("flooding")]
     Flood,
-    /// The game removed it.
+    /// The game removed the client.
     #[error("kicked")]
     ByGame,
     /// The player has connected again, and plays over the new connection.

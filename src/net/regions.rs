@@ -8,8 +8,8 @@ use xxhash_rust::xxh3::Xxh3Default;
 use crate::lattice::{BrickPos, ChunkGrid, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{Patch, Receipt, Terrain, World};
 
-/// Runs and commits everything that was submitted to a terrain, and updates the hashes of its regions. Calls `before` with
-/// the world and the change of each commit, and returns the receipts and the regions that changed.
+/// Runs and commits everything that was submitted to a terrain, and updates the hashes of its regions. Calls `before`
+/// with the world and the change of each commit, and returns the receipts and the regions that changed.
 pub(super) fn run_submitted(
     terrain: &mut Terrain,
     sums: &mut RegionSums,

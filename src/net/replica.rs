@@ -30,7 +30,7 @@ struct Reads {
     reach: LatticeBox,
     /// How far from those it reads, along each axis.
     around: IVec3,
-    /// Of an edit whose box is mostly empty, such as a long path.
+    /// The edit's evaluator, if its box is mostly empty, as that of a long path is.
     evaluator: Option<Evaluator>,
 }
 
@@ -354,8 +354,8 @@ impl Replica {
                 .all(|pos| !self.predicted.bricks.contains_key(pos) && !is_read(pos.samples()))
     }
 
-    /// Updates the shown world. Returns the order that changes it, if there is a change, and the receipts of the pending edits
-    /// that were predicted last, in order.
+    /// Updates the shown world. Returns the order that changes it, if there is a change, and the receipts of the
+    /// pending edits that were predicted last, in order.
     pub fn update(&mut self) -> (Option<Order>, Option<Vec<Receipt>>) {
         // Names of fields may differ that were drafted one after the other.
         self.is_outdated |= self.pending.is_empty() && !self.predicted.is_empty();

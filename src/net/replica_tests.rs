@@ -73,7 +73,7 @@ fn edit(rng: &mut Rng, image: &Arc<GreyImage>, [x, y]: EditPlaces) -> Edit {
     Edit::quantize(&brush.with_power(rng.u8(100..=255))).expect("a valid brush")
 }
 
-/// Something that is no client's edit.
+/// An entry that is not a client's edit.
 fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
     match rng.u32(0..4) {
         0 => {
@@ -228,7 +228,8 @@ fn what_is_shown_is_the_order_with_the_pending_edits() {
     for round in 0..rounds {
         let mut rng = Rng::with_seed(round);
         let mut play = Play::new();
-        // In every other round the others are mostly too far away to meet what own edits read: to the side of them, or below.
+        // In every other round the others are mostly too far away to meet what own edits read: to the side of them, or
+        // below.
         let (near, others) = match round % 4 {
             1 => ([(8.0, 22.0), SURFACE], [(34.0, 66.0), SURFACE]),
             3 => ([(8.0, 48.0), (34.0, 90.0)], NEAR),

@@ -74,8 +74,7 @@ pub fn show(
 }
 
 fn operations(ui: &mut Ui, tool: &mut BrushTool, voxel: f32, panel: &BurrowPanel) {
-    let (names, help): (Vec<&str>, Vec<&str>) =
-        OPERATIONS.iter().map(|row| (row.name(), row.help())).unzip();
+    let (names, help): (Vec<&str>, Vec<&str>) = OPERATIONS.iter().map(|row| (row.name(), row.help())).unzip();
     let chosen = OPERATIONS.iter().position(|row| row.tool == tool.operation).unwrap_or_default();
     let clicked = tiles(
         ui,

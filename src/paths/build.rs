@@ -71,8 +71,8 @@ fn mesh(polygons: &NavPolygons, scale: f32) -> Option<Arc<ValidNavigationMesh3d>
         .map(Arc::new)
 }
 
-/// Makes islands of tiles that are done, and replaces those that changed. Waits for tiles that the commit of the last frame
-/// changed.
+/// Makes islands of tiles that are done, and replaces those that changed. Waits for tiles that the commit of the last
+/// frame changed.
 pub(super) fn replace_islands(
     mut navigations: Query<(&Navigation, &mut NavigationTiles)>,
     places: Places,
@@ -91,7 +91,8 @@ pub(super) fn replace_islands(
             let is_awaited = std::mem::take(&mut build.is_awaited);
             let time = if is_awaited { wait.0.saturating_sub(start.elapsed()) } else { Duration::ZERO };
             let Some(result) = build.task.check_within(time) else { return true };
-            // A task that panicked has logged why. Its tiles have no islands: those before may be of ground that is gone.
+            // A task that panicked has logged why. Its tiles have no islands: those before may be of ground that is
+            // gone.
             let empty = |_| build.tiles.iter().map(|&pos| (pos, None)).collect();
             done.push((build.number, result.unwrap_or_else(empty)));
             false

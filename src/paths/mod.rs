@@ -2,8 +2,9 @@
 //! that opened it.
 //!
 //! Spawn a [`Navigation`] for each kind of agent, and add the [`NavigationPlugin`] as well as
-//! [`Landmass3dPlugin`](bevy_landmass::Landmass3dPlugin). It turns the [walkable](crate::navigation) ground of each tile into an
-//! island of landmass, in a task, and replaces the islands of tiles that a commit changes. Works with `MinimalPlugins`.
+//! [`Landmass3dPlugin`](bevy_landmass::Landmass3dPlugin). It turns the [walkable](crate::navigation) ground of each
+//! tile into an island of landmass, in a task, and replaces the islands of tiles that a commit changes. Works with
+//! `MinimalPlugins`.
 //!
 //! | part | content |
 //! | --- | --- |
@@ -35,8 +36,8 @@ use crate::plugin::{BurrowSystems, CommitSameFrame, FollowCommits};
 /// Keeps islands of landmass up to date with terrains, for each [`Navigation`].
 #[derive(Clone, Copy, Debug)]
 pub struct NavigationPlugin {
-    /// The longest that a frame waits for tiles that the commit of the last frame changed. They are built while the last frame
-    /// ends, so it seldom waits at all; tiles that take longer are replaced when they are done.
+    /// The longest that a frame waits for tiles that the commit of the last frame changed. They are built while the
+    /// last frame ends, so it seldom waits at all; tiles that take longer are replaced when they are done.
     pub wait: Duration,
 }
 
@@ -46,8 +47,8 @@ impl Default for NavigationPlugin {
     }
 }
 
-/// The systems of the [`NavigationPlugin`]: in `PreUpdate`, where tiles that are done become islands; in `Update`, within
-/// [`BurrowSystems::Commit`]; and in `PostUpdate`, for commits in the frame of the click.
+/// The systems of the [`NavigationPlugin`]: in `PreUpdate`, where tiles that are done become islands; in `Update`,
+/// within [`BurrowSystems::Commit`]; and in `PostUpdate`, for commits in the frame of the click.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct NavigationSystems;
 
@@ -100,11 +101,13 @@ pub enum NavigationArea {
     /// Around [`NavigationSource`]s.
     #[default]
     NearSources,
-    /// On the whole terrain: for worlds of up to a square kilometre or so, as landmass looks at each island in each frame.
+    /// On the whole terrain: for worlds of up to a square kilometre or so, as landmass looks at each island in each
+    /// frame.
     Everywhere,
 }
 
-/// A place around which agents find paths, on each terrain with a [`Navigation`] near [sources](NavigationArea::NearSources).
+/// A place around which agents find paths, on each terrain with a [`Navigation`] near
+/// [sources](NavigationArea::NearSources).
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component)]
 #[require(Transform)]
@@ -115,8 +118,8 @@ pub struct NavigationSource {
 
 /// Options of an archipelago for agents with these settings, in metres, on ground with voxels of this size.
 ///
-/// Agents are found on the ground within a step above and below, and within two voxels to its side: they may be pushed where the
-/// mesh, which keeps whole cells from walls, does not reach.
+/// Agents are found on the ground within a step above and below, and within two voxels to its side: they may be pushed
+/// where the mesh, which keeps whole cells from walls, does not reach.
 pub fn archipelago_options(agent: &WalkSettings, voxel_size: f32) -> ArchipelagoOptions<ThreeD> {
     let vertical = agent.step + 2.0 * agent.precision + 0.5 * voxel_size;
     ArchipelagoOptions {

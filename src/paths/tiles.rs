@@ -40,7 +40,7 @@ pub(super) struct LoadedTile {
     pub build: u64,
     pub polygons: Option<Arc<NavPolygons>>,
     pub island: Option<Entity>,
-    /// Its links over ledges, and their entities, children of the island.
+    /// The tile's links over ledges; `links` are their entities, children of the island.
     pub ledges: Vec<LedgeLink>,
     pub links: Vec<Entity>,
 }

@@ -5,11 +5,11 @@ use bevy::prelude::*;
 
 /// A character: a kinematic capsule for avian, moved by its [`CharacterSteering`].
 ///
-/// Its `Transform` is at the middle of the capsule; [`feet`](Self::feet) and [`eyes`](Self::eyes) are measured from there.
-/// A parent carries it along. If its height changes, its feet stay in place; before a game lets it stand up, it must check
-/// that there is room. [`CharacterPlugin`](super::CharacterPlugin) moves it. Add avian's `TransformInterpolation` for smooth
-/// motion at any frame rate. It needs colliders below it: give it, or the camera that follows it, a
-/// [`ColliderSource`](super::ColliderSource).
+/// Its `Transform` is at the middle of the capsule; [`feet`](Self::feet) and [`eyes`](Self::eyes) are measured from
+/// there. A parent carries it along. If its height changes, its feet stay in place; before a game lets it stand up, it
+/// must check that there is room. [`CharacterPlugin`](super::CharacterPlugin) moves it. Add avian's
+/// `TransformInterpolation` for smooth motion at any frame rate. It needs colliders below it: give it, or the camera
+/// that follows it, a [`ColliderSource`](super::ColliderSource).
 ///
 /// ```
 /// # use bevy::prelude::*;

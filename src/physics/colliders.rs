@@ -88,8 +88,8 @@ impl GroundColliders {
 }
 
 impl SurfaceProcessor for GroundColliders {
-    /// True within a source's radius. It also is a little beyond, where a collider remains: a dig there cuts a hole into the
-    /// tile's collider, so the chunk that fills the hole must get its own in the same commit.
+    /// True within a source's radius. It also is a little beyond, where a collider remains: a dig there cuts a hole
+    /// into the tile's collider, so the chunk that fills the hole must get its own in the same commit.
     fn wants(&self, part: &Part) -> bool {
         let near = self.0.near.read().unwrap_or_else(PoisonError::into_inner);
         let tile = part.drawn.tile();
@@ -127,9 +127,9 @@ fn body_of(part: &EntityWorldMut) -> Option<Entity> {
 /// How far from 1 a scale may be by rounding.
 const ROUNDING: f32 = 1e-4;
 
-/// Inserts a collider. Avian scales a new one at once by the scale of the body's `GlobalTransform`, and that of a rotated
-/// terrain is not exactly 1: the shape would be copied here, on the main thread, and be a plain mesh until the next step. So
-/// the body's place has no rotation while the collider is inserted.
+/// Inserts a collider. Avian scales a new one at once by the scale of the body's `GlobalTransform`, and that of a
+/// rotated terrain is not exactly 1: the shape would be copied here, on the main thread, and be a plain mesh until the
+/// next step. So the body's place has no rotation while the collider is inserted.
 fn insert_unscaled(body: &mut EntityWorldMut, collider: Collider) {
     let place = body.get::<GlobalTransform>().copied();
     let rounded = place.filter(|place| place.scale().abs_diff_eq(Vec3::ONE, ROUNDING));
@@ -237,8 +237,8 @@ pub(super) fn forget(
     });
 }
 
-/// Moves colliders to their tiles and chunks before a step. Avian itself ignores rotations of less than a tenth of a degree,
-/// so ground that turns slowly would leave its colliders behind.
+/// Moves colliders to their tiles and chunks before a step. Avian itself ignores rotations of less than a tenth of a
+/// degree, so ground that turns slowly would leave its colliders behind.
 pub(super) fn follow(
     parts: Query<
         (Entity, &Children),
@@ -271,8 +271,8 @@ pub(super) fn follow(
     figures.main_thread += start.elapsed();
 }
 
-/// Resets bodies of ground to the origins of their parts after a step. Avian computes their local transforms from the global
-/// ones, and the rounding errors would add up.
+/// Resets bodies of ground to the origins of their parts after a step. Avian computes their local transforms from the
+/// global ones, and the rounding errors would add up.
 pub(super) fn reset_to_parent(mut bodies: Query<&mut Transform, (With<GroundBody>, Changed<Transform>)>) {
     for mut transform in &mut bodies {
         let origin = Transform::from_scale(transform.scale);

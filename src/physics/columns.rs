@@ -38,7 +38,7 @@ pub(super) type Parts<'w, 's> = Query<
 pub(super) struct PartState {
     pub has_collider: bool,
     pub is_missing: bool,
-    /// It has a collider, or needs none.
+    /// Whether the part has a collider, or needs none.
     pub is_ready: bool,
 }
 

@@ -1,14 +1,14 @@
 //! Contact normals of a triangle that knows its neighbours.
 //!
-//! A body that rolls from one triangle to the next touches the edge between them. A lone triangle's edge could push it in any
-//! outward direction, which is a bump on flat ground. With the neighbours known, a contact normal leans over an edge at most
-//! as far as the neighbour's own normal, and not at all where the ground is flat or concave.
+//! A body that rolls from one triangle to the next touches the edge between them. A lone triangle's edge could push it
+//! in any outward direction, which is a bump on flat ground. With the neighbours known, a contact normal leans over an
+//! edge at most as far as the neighbour's own normal, and not at all where the ground is flat or concave.
 
 use avian3d::parry::math::Vector;
 use avian3d::parry::query::details::NormalConstraints;
 
-/// How much farther than its neighbours a normal may lean, as a sine. Rounding must not decide between two triangles when a
-/// body is right above their edge.
+/// How much farther than its neighbours a normal may lean, as a sine. Rounding must not decide between two triangles
+/// when a body is right above their edge.
 const SLACK: f32 = 1e-3;
 
 /// The most rounds over the three sides. At a right angle each round halves the excess.

@@ -21,8 +21,8 @@ use crate::threads::{ThreadTask, Threads, panic_message};
 /// frame in which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is built
 /// with the transaction; it is built on the main thread only if the game commits transactions itself.
 ///
-/// Matter is neither doubled nor lost: when a piece becomes ground again, by an undo of any player or because a server refused
-/// the dig, its debris is despawned wherever it has rolled, and no other is. A redo lets it fall again.
+/// Matter is neither doubled nor lost: when a piece becomes ground again, by an undo of any player or because a server
+/// refused the dig, its debris is despawned wherever it has rolled, and no other is. A redo lets it fall again.
 ///
 /// Requires avian's `PhysicsPlugins`, the [`TerrainPhysicsPlugin`](super::TerrainPhysicsPlugin), and a
 /// [`ColliderSource`](super::ColliderSource) nearby, so that there is ground to fall on.
@@ -59,8 +59,8 @@ impl Default for DebrisSettings {
     }
 }
 
-/// A piece of ground that broke off and is a rigid body now. Its `Transform` is at the middle of the piece, [`DebrisOf`]
-/// is its terrain, and its mesh is a child with a [`GroundPiece`] that looks as it did in the ground.
+/// A piece of ground that broke off and is a rigid body now. Its `Transform` is at the middle of the piece,
+/// [`DebrisOf`] is its terrain, and its mesh is a child with a [`GroundPiece`] that looks as it did in the ground.
 #[derive(Component, Clone, Debug, PartialEq)]
 #[require(RigidBody::Dynamic, Visibility, TransformInterpolation)]
 pub struct Debris {
@@ -68,9 +68,9 @@ pub struct Debris {
     pub id: PieceId,
     /// The tag of the brush that cut it off.
     pub tag: u64,
-    /// Its most common material.
+    /// The most common material of the piece.
     pub material: MaterialId,
-    /// Its size in voxels.
+    /// The size of the piece in voxels.
     pub voxels: u64,
     /// Half the sides of its bounds as it was in the ground, in metres.
     pub half: Vec3,
@@ -84,8 +84,8 @@ pub struct Debris {
 #[relationship(relationship_target = TerrainDebris)]
 pub struct DebrisOf(pub Entity);
 
-/// The pieces that broke off from a terrain, including those whose colliders are still being built. They are despawned with
-/// it, and when another `Terrain` replaces it.
+/// The pieces that broke off from a terrain, including those whose colliders are still being built. They are despawned
+/// with it, and when another `Terrain` replaces it.
 #[derive(Component, Reflect, Clone, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 #[relationship_target(relationship = DebrisOf, linked_spawn)]

@@ -13,9 +13,9 @@ use crate::terrain::Terrain;
 /// entity.
 ///
 /// The walls are static colliders and children of the terrain: they move with it, and have the layers of its
-/// [`TerrainContact`], if it has one. They are rebuilt when another terrain or another ground takes its place, and removed
-/// with this component or with the terrain. Insert it again to change it. If a size is not finite and positive, there
-/// are no walls, and an error is logged.
+/// [`TerrainContact`], if it has one. They are rebuilt when another terrain or another ground takes its place, and
+/// removed with this component or with the terrain. Insert it again to change it. If a size is not finite and positive,
+/// there are no walls, and an error is logged.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -28,8 +28,8 @@ use crate::terrain::Terrain;
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq)]
 #[reflect(Component, Default)]
 pub struct EdgeWalls {
-    /// How far the walls reach above the highest ground and below the lowest, in voxels. The ground is that of the heightmap;
-    /// pits may be deeper and buildings higher by this value.
+    /// How far the walls reach above the highest ground and below the lowest, in voxels. The ground is that of the
+    /// heightmap; pits may be deeper and buildings higher by this value.
     pub height: f32,
     /// How thick the walls are, in voxels. They stand outside the terrain. Fast bodies need thick walls.
     pub thickness: f32,
@@ -45,7 +45,7 @@ impl Default for EdgeWalls {
 #[derive(Component)]
 pub(super) struct EdgeWall;
 
-/// Those of disabled terrains too.
+/// All walls, including those of disabled terrains.
 type Walls<'w, 's> = Query<'w, 's, (Entity, &'static ChildOf), (With<EdgeWall>, Allow<Disabled>)>;
 
 type Terrains<'w, 's> =

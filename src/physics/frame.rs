@@ -97,7 +97,8 @@ impl<'a> TerrainFrame<'a> {
         let tiles = tiles.into_iter().flat_map(|(first, last)| {
             (first.z..=last.z).flat_map(move |z| (first.x..=last.x).map(move |x| TilePos { x, z }))
         });
-        // A column without a tile is loading, has coarser ground drawn over it and no source near, or the game despawned it.
+        // A column without a tile is loading, has coarser ground drawn over it and no source near, or the game
+        // despawned it.
         let lacks = |tile| self.entities.is_some_and(|entities| entities.lack(tile));
         let is_ready =
             move |tile| !lacks(tile) && columns.is_ready((self.terrain, tile)).unwrap_or(self.is_shown);

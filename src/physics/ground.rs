@@ -14,8 +14,8 @@ pub struct GroundCollider {
     pub revision: u64,
 }
 
-/// The static body of a tile or chunk. It is on the entity with the [`Collider`], a child of the tile or chunk that stays
-/// at its parent's origin.
+/// The static body of a tile or chunk. It is on the entity with the [`Collider`], a child of the tile or chunk that
+/// stays at its parent's origin.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
 #[require(RigidBody::Static)]
 pub struct GroundBody {
@@ -25,8 +25,8 @@ pub struct GroundBody {
     pub drawn: MeshKey,
 }
 
-/// The contact properties of ground, for all terrains without a [`TerrainContact`]. A change applies to each collider when
-/// it is next made; components that a game inserts on a [`GroundBody`] itself stay until then.
+/// The contact properties of ground, for all terrains without a [`TerrainContact`]. A change applies to each collider
+/// when it is next made; components that a game inserts on a [`GroundBody`] itself stay until then.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]
 pub struct GroundContact {
@@ -55,8 +55,8 @@ pub struct GroundContact {
 #[reflect(Component, Default)]
 pub struct TerrainContact(pub GroundContact);
 
-/// Leaves a terrain out of physics: it gets no colliders and loses those that it has, and no body is held or lifted by it.
-/// Useful for a backdrop. Put it on the terrain's entity; its [`EdgeWalls`](super::EdgeWalls) stay.
+/// Leaves a terrain out of physics: it gets no colliders and loses those that it has, and no body is held or lifted by
+/// it. Useful for a backdrop. Put it on the terrain's entity; its [`EdgeWalls`](super::EdgeWalls) stay.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Component, Default)]
 pub struct TerrainPhysicsDisabled;
@@ -90,7 +90,7 @@ fn apply_to_all(world: &mut World, terrain: Entity) {
 struct Applied(GroundContact);
 
 impl GroundContact {
-    /// That of a terrain's ground.
+    /// The contact of a terrain's ground.
     pub(super) fn of(world: &World, terrain: Entity) -> Self {
         let own = world.get::<TerrainContact>(terrain).map(|own| own.0.clone());
         own.unwrap_or_else(|| world.resource::<Self>().clone())

@@ -17,16 +17,16 @@ use crate::lattice::ChunkGrid;
 use crate::plugin::{Places, TerrainEntities};
 use crate::terrain::Terrain;
 
-/// Marks a body that is held still until the ground below it has colliders, because the terrain is loading or the body is
-/// outside the radius of every [`ColliderSource`].
+/// Marks a body that is held still until the ground below it has colliders, because the terrain is loading or the body
+/// is outside the radius of every [`ColliderSource`].
 ///
-/// The plugin inserts it on dynamic bodies, whose axes it locks, and on [`Character`](super::Character)s, and removes it
-/// again. Bodies high above the ground are not held, nor are those that do not collide with it: sensors, and bodies on other
-/// [layers](super::GroundContact::layers).
+/// The plugin inserts it on dynamic bodies, whose axes it locks, and on [`Character`](super::Character)s, and removes
+/// it again. Bodies high above the ground are not held, nor are those that do not collide with it: sensors, and bodies
+/// on other [layers](super::GroundContact::layers).
 ///
 /// When it is removed, by the plugin or by the game, the body gets back its velocity and its `LockedAxes`. If a game
-/// changes `LockedAxes` or sets a non-zero velocity while the body is held, those are used instead. To stop a held body, set
-/// the velocity in this component.
+/// changes `LockedAxes` or sets a non-zero velocity while the body is held, those are used instead. To stop a held
+/// body, set the velocity in this component.
 #[derive(Component, Reflect, Clone, Copy, Debug, Default)]
 #[reflect(Component, Default)]
 pub struct HeldByGround {
@@ -210,8 +210,8 @@ impl HoldCheck<'_, '_, '_> {
         !self.changed.is_empty() && self.frames.iter().any(has_changed)
     }
 
-    /// The terrain a body is held for: it collides with its ground and, if that has to be checked, may soon reach a place where
-    /// this ground has no collider.
+    /// The terrain a body is held for: it collides with its ground and, if that has to be checked, may soon reach a
+    /// place where this ground has no collider.
     fn holder(&self, body: &BodyItem, solids: &Solids, must_check: bool) -> Option<Entity> {
         let towards = body.hold.as_ref().map_or(body.velocity.0, |hold| hold.velocity);
         let placed = if must_check { self.placed(body) } else { None };

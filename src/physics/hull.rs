@@ -12,8 +12,8 @@ const HOLLOW: f32 = 0.25;
 /// Cells along the longest side for the convex decomposition of other pieces.
 const RESOLUTION: u32 = 24;
 
-/// A collider for a loose piece of ground: its convex hull, or a convex decomposition for concave pieces. In metres from the
-/// origin of the piece's mesh, which must be closed; `None` for a piece without volume.
+/// A collider for a loose piece of ground: its convex hull, or a convex decomposition for concave pieces. In metres
+/// from the origin of the piece's mesh, which must be closed; `None` for a piece without volume.
 ///
 /// It takes milliseconds, or tens of them for a large concave piece, so call it in a task.
 pub fn debris_collider(piece: &SurfaceMesh, voxel_size: f32) -> Option<Collider> {

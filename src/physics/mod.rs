@@ -30,20 +30,21 @@
 //!
 //! # Guarantees
 //!
-//! - **One commit.** A collider is built from the same arrays as the mesh, in the same task, and swapped in the same frame.
-//!   It has exactly the triangles that are drawn, each once. Servers without meshes have the same colliders. Only if a source
-//!   arrives during a transaction does the collider follow one task later. A terrain may move and rotate: its colliders are
-//!   moved to its tiles and chunks before each step.
-//! - **No bumps.** Triangles know their neighbours, including those of other tiles and chunks (see [`GroundShape`]), so a
-//!   body that rolls over a border or a seam does not feel it.
-//! - **Nothing falls through.** An old collider stays until the new one replaces it, and a collider that was built from an
-//!   outdated world is dropped. Colliders are made within the radius of a source, and around where it will be in a second. A
-//!   body over ground without a collider [is held](HeldByGround) until there is one. Where a game despawned the tile, bodies
-//!   fall.
-//! - **Dug ground releases bodies.** Sleeping bodies are woken where a surface changed, moved or disappeared. Bodies that
-//!   were built over, or are squeezed into the ground soon after it changed, are lifted to the nearest air above (along the
-//!   terrain's own y axis), since ground is one-sided. Bodies that get into the ground in another way are lifted some frames
-//!   later. Sensors, bodies on layers that ignore the ground, sleeping bodies and those locked along y are left alone.
+//! - **One commit.** A collider is built from the same arrays as the mesh, in the same task, and swapped in the same
+//!   frame. It has exactly the triangles that are drawn, each once. Servers without meshes have the same colliders.
+//!   Only if a source arrives during a transaction does the collider follow one task later. A terrain may move and
+//!   rotate: its colliders are moved to its tiles and chunks before each step.
+//! - **No bumps.** Triangles know their neighbours, including those of other tiles and chunks (see [`GroundShape`]), so
+//!   a body that rolls over a border or a seam does not feel it.
+//! - **Nothing falls through.** An old collider stays until the new one replaces it, and a collider that was built from
+//!   an outdated world is dropped. Colliders are made within the radius of a source, and around where it will be in a
+//!   second. A body over ground without a collider [is held](HeldByGround) until there is one. Where a game despawned
+//!   the tile, bodies fall.
+//! - **Dug ground releases bodies.** Sleeping bodies are woken where a surface changed, moved or disappeared. Bodies
+//!   that were built over, or are squeezed into the ground soon after it changed, are lifted to the nearest air above
+//!   (along the terrain's own y axis), since ground is one-sided. Bodies that get into the ground in another way are
+//!   lifted some frames later. Sensors, bodies on layers that ignore the ground, sleeping bodies and those locked along
+//!   y are left alone.
 //!
 //! Bodies are ordinary avian bodies, and ground is `RigidBody::Static`. [`GroundContact`] sets its `Friction`,
 //! `Restitution` and `CollisionLayers`, and [`TerrainContact`] those of one terrain.
@@ -94,9 +95,9 @@ use crate::plugin::{BeforeLoad, BurrowSystems, CommitSameFrame, SurfaceProcessor
 
 /// Colliders for terrains. Requires avian's `PhysicsPlugins` and the crate's `BurrowPlugins`.
 ///
-/// Avian must run in `FixedPostUpdate`, where `PhysicsPlugins::default()` puts it, since this plugin's systems run right
-/// before and after its steps (see [`TerrainPhysicsSystems`]). With another schedule, colliders follow moving terrains late
-/// and bodies are lifted late; an error is logged.
+/// Avian must run in `FixedPostUpdate`, where `PhysicsPlugins::default()` puts it, since this plugin's systems run
+/// right before and after its steps (see [`TerrainPhysicsSystems`]). With another schedule, colliders follow moving
+/// terrains late and bodies are lifted late; an error is logged.
 #[derive(Default)]
 pub struct TerrainPhysicsPlugin;
 

@@ -13,7 +13,8 @@ use crate::plugin::squares_within;
 /// The most stops on a way ahead, one for each chunk's width.
 const STOPS: u32 = 64;
 
-/// The shortest side of a voxel in world space, in metres: where parents stretch a terrain, colliders must not fall short.
+/// The shortest side of a voxel in world space, in metres: where parents stretch a terrain, colliders must not fall
+/// short.
 pub(super) fn shortest_side(place: &GlobalTransform) -> f32 {
     place.scale().abs().min_element()
 }
@@ -67,12 +68,12 @@ fn relevant(grid: ChunkGrid, mut stops: Vec<Stop>) -> Vec<Stop> {
     stops
 }
 
-/// The stops of a source at `from` that moves along `way`: one at its place, and one for each chunk's width ahead. All in
-/// voxels.
+/// The stops of a source at `from` that moves along `way`: one at its place, and one for each chunk's width ahead. All
+/// in voxels.
 pub(super) fn stops(grid: ChunkGrid, from: Vec2, way: Vec2, radius: f32) -> Vec<Stop> {
     let stride = grid.size() as f32;
-    // Rounded, so that small moves change nothing. A source that covers the whole grid is rounded to its column: it only
-    // decides which colliders are built first.
+    // Rounded, so that small moves change nothing. A source that covers the whole grid is rounded to its column: it
+    // only decides which colliders are built first.
     let home = (from / stride).floor() * stride + stride / 2.0;
     if reaches_all(grid, (home, radius + 1.0)) {
         return vec![(home.clamp(Vec2::ZERO, end(grid)), end(grid).length() + 1.0)];
@@ -91,8 +92,8 @@ struct Area {
     stops: Vec<Stop>,
     /// Whether one stop covers the whole grid.
     is_all: bool,
-    /// The distance from each column to the nearest disc, in voxels; negative inside. Columns farther away than a chunk's
-    /// width are left out.
+    /// The distance from each column to the nearest disc, in voxels; negative inside. Columns farther away than a
+    /// chunk's width are left out.
     columns: FxHashMap<TilePos, f32>,
 }
 
@@ -142,7 +143,7 @@ impl Neighbourhood {
     }
 
     /// Whether both share the same areas.
-    pub fn is(&self, other: &Self) -> bool {
+    pub fn is_same(&self, other: &Self) -> bool {
         let is_in_other =
             |(terrain, area): (_, &Arc<Area>)| other.0.get(terrain).is_some_and(|own| Arc::ptr_eq(own, area));
         self.0.len() == other.0.len() && self.0.iter().all(is_in_other)
@@ -240,7 +241,7 @@ mod tests {
             Neighbourhood([(Entity::PLACEHOLDER, Arc::new(area))].into_iter().collect())
         });
         after.changes(&before, |column| panic!("{column:?} was near before"));
-        assert!(!after.is(&before), "the nearest is another one");
+        assert!(!after.is_same(&before), "the nearest is another one");
 
         assert_eq!(at(81.0, 20.0).len(), 1 + 13, "for each chunk's width of the way");
         assert_ne!(at(81.0, 20.0), at(82.0, 20.0));
@@ -253,15 +254,15 @@ mod tests {
             let area = Area::new(grid, stops(grid, Vec2::new(x, 50.0), Vec2::ZERO, 20.0));
             Neighbourhood([(Entity::PLACEHOLDER, Arc::new(area))].into_iter().collect())
         });
-        let mut told = std::collections::BTreeSet::new();
+        let mut reported = std::collections::BTreeSet::new();
         there.changes(&here, |(_, column)| {
-            told.insert(column);
+            reported.insert(column);
         });
         let is_near = |area: &Neighbourhood, column: TilePos| {
             area.distance((Entity::PLACEHOLDER, column)).is_some_and(|distance| distance <= 0.0)
         };
         for column in grid.tiles().filter(|&column| is_near(&here, column) != is_near(&there, column)) {
-            assert!(told.contains(&column), "{column:?}");
+            assert!(reported.contains(&column), "{column:?}");
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Balanced trees of bounding boxes.
 //!
-//! parry splits boxes by a cost function, level by level, which takes most of the time of a collider. Here each split halves
-//! them by count. That tree is nearly as good, and its structure depends on nothing but the number of boxes: it is copied from
-//! an earlier tree, and only the boxes are computed.
+//! parry splits boxes by a cost function, level by level, which takes most of the time of a collider. Here each split
+//! halves them by count. That tree is nearly as good, and its structure depends on nothing but the number of boxes: it
+//! is copied from an earlier tree, and only the boxes are computed.
 
 use std::ops::Range;
 use std::sync::{Arc, LazyLock, PoisonError, RwLock};
@@ -15,7 +15,8 @@ use rustc_hash::FxHashMap;
 /// Trees with more leaves are built by parry: copies of that size would take more memory than they save time.
 const LARGEST: usize = 1 << 14;
 
-/// Sizes of copied trees, for each power of two. A tree is copied from the next larger one, without the leaves that it lacks.
+/// Sizes of copied trees, for each power of two. A tree is copied from the next larger one, without the leaves that it
+/// lacks.
 const STEPS: usize = 16;
 
 /// Subtrees with no more leaves than this are not split by place.
@@ -24,8 +25,8 @@ const FEW: usize = 8;
 /// Balanced trees by their number of leaves.
 static TREES: LazyLock<RwLock<FxHashMap<usize, Arc<Bvh>>>> = LazyLock::new(RwLock::default);
 
-/// A tree over some boxes, and for each of its leaves the number of the box. `is_heightmap` says that no box lies above another,
-/// which makes it faster.
+/// A tree over some boxes, and for each of its leaves the number of the box. `is_heightmap` says that no box lies above
+/// another, which makes it faster.
 pub(super) fn ordered_bvh(bounds: &[Aabb], is_heightmap: bool) -> (Bvh, Vec<u32>) {
     let count = bounds.len();
     if count > LARGEST {
@@ -103,8 +104,8 @@ static CURVE: LazyLock<[u16; SIDE * SIDE]> = LazyLock::new(|| {
     std::array::from_fn(|square| place(square % SIDE, square / SIDE))
 });
 
-/// The centres in order of a curve over the plane. Neighbours along it are neighbours in the plane, so halves of the list are
-/// compact regions.
+/// The centres in order of a curve over the plane. Neighbours along it are neighbours in the plane, so halves of the
+/// list are compact regions.
 fn along_curve(centers: &[Center]) -> Vec<Center> {
     let square = |center: &Center| {
         let [x, _, z] = center.place.map(|place| place as usize * SIDE / (GRID as usize + 1));
@@ -141,8 +142,8 @@ impl Leaves {
         leaf * self.used / self.size
     }
 
-    /// Orders the centres of these leaves so that each subtree has its own region: halves them along the longest axis, then the
-    /// halves, and so on.
+    /// Orders the centres of these leaves so that each subtree has its own region: halves them along the longest axis,
+    /// then the halves, and so on.
     fn halve(&self, centers: &mut [Center], leaves: Range<usize>) {
         if leaves.len() <= FEW {
             return;

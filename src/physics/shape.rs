@@ -23,9 +23,9 @@ use crate::surface::SurfaceMesh;
 
 /// A triangle mesh whose triangles know their neighbours, including those in other tiles and chunks.
 ///
-/// The triangles are exactly those that are drawn, in metres from the part's origin. Within the mesh, neighbours are looked
-/// up. Across its border, their normals are derived from the vertex normals, which are bit-equal on both sides. So bodies do
-/// not feel the border, and no mesh has to be rebuilt because another one changed.
+/// The triangles are exactly those that are drawn, in metres from the part's origin. Within the mesh, neighbours are
+/// looked up. Across its border, their normals are derived from the vertex normals, which are bit-equal on both sides.
+/// So bodies do not feel the border, and no mesh has to be rebuilt because another one changed.
 ///
 /// Below a parent with a scale, avian 0.7 replaces the shape by a plain triangle mesh, so such ground has bumps and two
 /// sides.
@@ -36,7 +36,8 @@ pub struct GroundShape {
     tree: Bvh,
     /// The triangle of each leaf of the tree.
     leaves: Vec<u32>,
-    /// For each triangle, the neighbours across its sides: a triangle's number, or [`BORDER`] plus an index of `beyond`.
+    /// For each triangle, the neighbours across its sides: a triangle's number, or [`BORDER`] plus an index of
+    /// `beyond`.
     neighbours: Vec<[u32; 3]>,
     /// Normals of the ground across the border.
     beyond: Vec<Vector>,
@@ -94,7 +95,8 @@ impl GroundShape {
             + self.plain.get().and_then(Option::as_ref).map_or(0, |plain| plain.total_memory_size())
     }
 
-    /// The box around all triangles that only one of two shapes has, in metres from the origin; `None` if they are equal.
+    /// The box around all triangles that only one of two shapes has, in metres from the origin; `None` if they are
+    /// equal.
     pub(super) fn difference(old: Option<&Self>, new: Option<&Self>) -> Option<(Vec3, Vec3)> {
         type Corners = [[u32; 3]; 3];
         let corners = |shape: &Self, triangle: usize| -> Corners {
@@ -107,8 +109,8 @@ impl GroundShape {
             corners
         };
         let counts = [old, new].map(|shape| shape.map_or(0, Self::triangles));
-        // Both come in the same order, and most edits change few triangles of a part: so they are walked through side by side,
-        // and what does not fit is set aside.
+        // Both come in the same order, and most edits change few triangles of a part: so they are walked through side
+        // by side, and what does not fit is set aside.
         let (mut gone, mut fresh): (Vec<Corners>, Vec<Corners>) = Default::default();
         let (mut before, mut after, mut ends) = (0, 0, counts);
         if let (Some(old), Some(new)) = (old, new) {
@@ -313,8 +315,8 @@ mod tests {
     /// How steep the roof's slopes are: rise over run.
     const PITCH: f64 = 0.5;
 
-    /// For each triangle at the ridge of a roof along x = `ridge`: its normal, and the one it assumes for its neighbour across
-    /// the ridge. Chunks are 16 cells wide.
+    /// For each triangle at the ridge of a roof along x = `ridge`: its normal, and the one it assumes for its neighbour
+    /// across the ridge. Chunks are 16 cells wide.
     fn over_ridge(ridge: i32) -> Vec<(Vector, Vector)> {
         let height = |x: i32, _| 30.0 - PITCH * f64::from((x - ridge).abs());
         let ground = Ground::from_fn(32, 32, height).expect("valid");
@@ -344,7 +346,7 @@ mod tests {
         assert_eq!((within.len(), border.len()), (64, 64));
         for (face, beyond) in within.into_iter().chain(border) {
             let slope = Vector::new(PITCH as f32 * face.x.signum(), 1.0, 0.0).normalize();
-            assert!(face.abs_diff_eq(slope, 1e-5), "{face} is no slope of the roof");
+            assert!(face.abs_diff_eq(slope, 1e-5), "{face} is not a slope of the roof");
             let other = Vector::new(-slope.x, slope.y, 0.0);
             assert!(beyond.abs_diff_eq(other, 1e-5), "{beyond} next to {face}");
         }

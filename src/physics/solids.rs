@@ -1,4 +1,5 @@
-//! Which colliders of a body collide with ground, and how far the body reaches. Sensors and colliders on other layers do not.
+//! Which colliders of a body collide with ground, and how far the body reaches. Sensors and colliders on other layers
+//! do not.
 
 use avian3d::prelude::*;
 use bevy::ecs::query::QueryData;
@@ -31,8 +32,8 @@ impl SolidColliderItem<'_, '_> {
     }
 
     /// The distance from a point to this collider, for a body at this position and rotation; and a place inside the
-    /// collider. That is the point itself, or, if it is outside, a place halfway through the nearest part, since the surface
-    /// itself may touch the ground.
+    /// collider. That is the point itself, or, if it is outside, a place halfway through the nearest part, since the
+    /// surface itself may touch the ground.
     fn inside(&self, position: &Position, rotation: &Rotation, point: Vec3) -> Option<(f32, Vec3)> {
         let (shape, own) = (self.shape?, self.place.copied().unwrap_or_default());
         let (place, turn) = (position.0 + rotation * own.translation, *rotation * own.rotation);
@@ -131,8 +132,8 @@ impl Solids<'_, '_> {
         self.terrains.get(terrain).map_or(self.ground.layers, |own| own.0.layers)
     }
 
-    /// The box around a body's colliders that collide with ground on these layers; `None` if there are none, or if the body is
-    /// static.
+    /// The box around a body's colliders that collide with ground on these layers; `None` if there are none, or if the
+    /// body is static.
     pub fn bounds(
         &self,
         (entity, body, own): (Entity, &RigidBody, &RigidBodyColliders),
@@ -145,8 +146,8 @@ impl Solids<'_, '_> {
         solid.map(|collider| *collider.bounds).reduce(|a, b| a.merged(b))
     }
 
-    /// A place inside those colliders of a body that collide with ground: its middle, if one of them contains it. The middle
-    /// of an arch, for example, is outside.
+    /// A place inside those colliders of a body that collide with ground: its middle, if one of them contains it. The
+    /// middle of an arch, for example, is outside.
     pub fn inside(
         &self,
         own: &RigidBodyColliders,

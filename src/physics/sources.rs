@@ -17,7 +17,8 @@ use crate::terrain::Terrain;
 /// How far ahead of a moving source colliders are made, in seconds.
 const AHEAD: f32 = 1.0;
 
-/// About how many bytes colliders take for each cell (x, z): two triangles, with their share of vertices and of the tree.
+/// About how many bytes colliders take for each cell (x, z): two triangles, with their share of vertices and of the
+/// tree.
 const CELL_BYTES: f32 = 186.0;
 
 /// A source that wants colliders of more bytes than this is warned of.
@@ -77,7 +78,7 @@ pub(super) fn find_near(
         }
         near.insert(terrain, grid, all, &known);
     }
-    if !near.is(&known) {
+    if !near.is_same(&known) {
         colliders.set_near(near.clone());
         let with_lod = terrains.iter().filter(|(.., has_lod)| *has_lod);
         wanted.0 = with_lod.map(|(terrain, ..)| (terrain, near.tiles(terrain).collect())).collect();

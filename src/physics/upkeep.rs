@@ -102,8 +102,8 @@ fn fail(world: &mut World, entity: Entity, Failure { part, why }: &Failure) {
     }
 }
 
-/// Checks the columns that changed, or that sources entered or left. Removes colliders far from all sources, and starts to
-/// build missing ones, the nearest first.
+/// Checks the columns that changed, or that sources entered or left. Removes colliders far from all sources, and starts
+/// to build missing ones, the nearest first.
 pub(super) fn update(
     mut commands: Commands,
     colliders: Res<GroundColliders>,
@@ -118,7 +118,7 @@ pub(super) fn update(
     let start = Instant::now();
     let near = colliders.near();
     let mut touched = columns.take_touched(&parts);
-    if !near.is(&known) {
+    if !near.is_same(&known) {
         near.changes(&known, |column| touched.extend([column]));
         *known = near;
     }
@@ -151,8 +151,8 @@ pub(super) fn update(
     figures.main_thread += start.elapsed();
 }
 
-/// Starts to build the nearest missing colliders, all of one terrain. A terrain whose current world is not shown yet has to
-/// wait, since its colliders would differ from what is drawn.
+/// Starts to build the nearest missing colliders, all of one terrain. A terrain whose current world is not shown yet
+/// has to wait, since its colliders would differ from what is drawn.
 fn begin(
     colliders: &GroundColliders,
     terrains: &Query<(&Terrain, &TerrainEntities)>,

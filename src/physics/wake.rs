@@ -59,8 +59,8 @@ impl GroundChange {
     }
 }
 
-/// Changes since bodies were last woken. There is one box for each tile or chunk, as many edits may happen while physics is
-/// paused.
+/// Changes since bodies were last woken. There is one box for each tile or chunk, as many edits may happen while
+/// physics is paused.
 #[derive(Resource, Default)]
 pub(super) struct GroundChanges {
     boxes: Vec<GroundChange>,
@@ -88,8 +88,8 @@ impl GroundChanges {
     }
 }
 
-/// Bodies near which a terrain changed recently, or that were found inside it, with the number of frames for which they are
-/// still checked.
+/// Bodies near which a terrain changed recently, or that were found inside it, with the number of frames for which they
+/// are still checked.
 #[derive(Resource, Default)]
 pub(super) struct WatchedBodies(HashMap<(Entity, Entity), u8>);
 
@@ -303,8 +303,8 @@ fn without_fall(velocity: Vec3, up: Dir3) -> Vec3 {
     velocity - up * velocity.dot(*up).min(0.0)
 }
 
-/// The terrain's up direction, and how far along it a body must move to leave the ground. `inside` is a point of the body in
-/// the ground, and `local` the same point in voxels of the terrain.
+/// The terrain's up direction, and how far along it a body must move to leave the ground. `inside` is a point of the
+/// body in the ground, and `local` the same point in voxels of the terrain.
 fn lift(
     world: &TerrainWorld,
     place: &GlobalTransform,

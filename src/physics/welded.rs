@@ -139,8 +139,8 @@ impl Area {
 struct OpenSides<'a> {
     triangles: &'a [[u32; 3]],
     neighbours: Vec<[u32; 3]>,
-    /// For each vertex, the side without a neighbour that was added last among those that start there. Side `s` of triangle
-    /// `t` has the number `3 t + s`.
+    /// For each vertex, the side without a neighbour that was added last among those that start there. Side `s` of
+    /// triangle `t` has the number `3 t + s`.
     first: Vec<u32>,
     /// For each side, the one that starts at the same vertex and was added before.
     next: Vec<u32>,

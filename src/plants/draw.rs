@@ -1,7 +1,8 @@
 //! Draws plants: a few entities for each patch, whose meshes hold many copies of one plant.
 //!
-//! All patches of a species share one mesh, so Bevy draws them together. The vertex shader puts each copy into its place, which
-//! it reads from a buffer, and leaves out those that do not stand by a bit of another one. A dig writes bits; no mesh is built.
+//! All patches of a species share one mesh, so Bevy draws them together. The vertex shader puts each copy into its
+//! place, which it reads from a buffer, and leaves out those that do not stand by a bit of another one. A dig writes
+//! bits; no mesh is built.
 
 use bevy::asset::RenderAssetUsages;
 use bevy::camera::primitives::{Aabb, MeshAabb};
@@ -58,13 +59,13 @@ impl Plugin for PlantDrawingPlugin {
 pub struct PlantLook {
     /// The name of the species.
     pub species: String,
-    /// Its mesh in metres, with its foot at the origin, for plants of size 1. Positions and normals; colours and the first
-    /// texture coordinates, if it has any.
+    /// The mesh in metres, with its foot at the origin, for plants of size 1. Positions and normals; colours and the
+    /// first texture coordinates, if it has any.
     pub mesh: Handle<Mesh>,
-    /// A simpler mesh for plants farther away than the species' [`detail`](crate::scatter::ViewDistances::detail). Without it,
-    /// they are drawn with the same mesh up to the end.
+    /// A simpler mesh for plants farther away than the species' [`detail`](crate::scatter::ViewDistances::detail).
+    /// Without it, they are drawn with the same mesh up to the end.
     pub far: Option<Handle<Mesh>>,
-    /// Its material.
+    /// The material of the mesh.
     pub material: StandardMaterial,
     /// Metres by which the wind moves what is a metre above the ground.
     pub sway: f32,
@@ -396,7 +397,8 @@ fn copies_of(one: &Mesh, copies: u32) -> Option<Mesh> {
     })
 }
 
-/// Makes larger buffers with all plants once there are more than they hold. Other changes are [written in place](super::upload).
+/// Makes larger buffers with all plants once there are more than they hold. Other changes are [written in
+/// place](super::upload).
 fn grow(
     buffers: &mut PlantBuffers,
     assets: &mut Assets<ShaderBuffer>,

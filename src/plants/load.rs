@@ -16,7 +16,8 @@ use crate::threads::{ThreadTask, Threads, free_later};
 /// The most cells whose patches one task makes.
 const CELLS: i32 = 1 << 16;
 
-/// The largest radius of a source, in voxels. A world may be far larger, and its squares are counted whenever a viewer moves.
+/// The largest radius of a source, in voxels. A world may be far larger, and its squares are counted whenever a viewer
+/// moves.
 const LARGEST_RADIUS: f32 = 2048.0;
 
 /// The place of a camera, or of a source with its radius, in voxels of the terrain.
@@ -50,7 +51,10 @@ pub(super) fn forget_rules(gone: On<Remove, Plants>, mut terrains: Query<&mut Sh
 }
 
 /// Without ground there are none either.
-pub(super) fn forget_ground(gone: On<Remove, Terrain>, mut terrains: Query<&mut ShownPlants, Allow<Disabled>>) {
+pub(super) fn forget_ground(
+    gone: On<Remove, Terrain>,
+    mut terrains: Query<&mut ShownPlants, Allow<Disabled>>,
+) {
     if let Ok(mut shown) = terrains.get_mut(gone.entity) {
         shown.clear();
     }

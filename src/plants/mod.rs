@@ -47,7 +47,8 @@ use crate::terrain::Version;
 #[derive(Default)]
 pub struct PlantsPlugin;
 
-/// The system that follows commits, in [`BurrowSystems::Commit`] and, for commits in the frame of the click, in `PostUpdate`.
+/// The system that follows commits, in [`BurrowSystems::Commit`] and, for commits in the frame of the click, in
+/// `PostUpdate`.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PlantSystems;
 
@@ -97,7 +98,8 @@ pub struct PlantSource {
     pub radius: f32,
 }
 
-/// The plants of a terrain that are loaded: around cameras, as far as their species is drawn, and around [`PlantSource`]s.
+/// The plants of a terrain that are loaded: around cameras, as far as their species is drawn, and around
+/// [`PlantSource`]s.
 #[derive(Component, Debug, Default)]
 pub struct ShownPlants {
     /// `None` until rules without an error were read.
@@ -167,10 +169,10 @@ pub struct PlantRemoved {
     pub terrain: Entity,
     /// The plant; its species is an index of the rules.
     pub plant: Plant,
-    /// Where it stood, in world space: its foot, how it is turned, and its size.
+    /// Where the plant stood, in world space: its foot, how it is turned, and its size.
     pub transform: Transform,
-    /// Whether a game felled it, as with [`removal_of`]: its ground and the air around it are as they were. `false` if they were
-    /// dug, built over or painted. See [`Scatter::is_felled`].
+    /// Whether a game felled it, as with [`removal_of`]: its ground and the air around it are as they were. `false` if
+    /// they were dug, built over or painted. See [`Scatter::is_felled`].
     pub is_felled: bool,
 }
 
@@ -181,7 +183,7 @@ pub struct PlantReturned {
     pub terrain: Entity,
     /// The plant.
     pub plant: Plant,
-    /// Where it stands, in world space.
+    /// Where the plant stands, in world space.
     pub transform: Transform,
 }
 

@@ -154,11 +154,11 @@ fn warn_of_beside((entity, terrain): (Entity, &Terrain), brush: &Brush, place: O
 enum Effect {
     /// An edit that reaches it.
     Taken(Edit),
-    /// It reaches the terrain, but is not valid there.
+    /// The brush reaches the terrain, but is not valid there.
     Refused(BrushError),
-    /// It does not reach the terrain.
+    /// The brush does not reach the terrain.
     Beside,
-    /// Its position is not a number.
+    /// The brush's position is not a number.
     Nowhere(BrushError),
 }
 

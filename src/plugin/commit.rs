@@ -101,7 +101,7 @@ pub(crate) struct GroundChanged {
     pub boxes: Option<Vec<LatticeBox>>,
 }
 
-/// All that it takes to commit.
+/// Parameters of the systems that commit.
 #[derive(SystemParam)]
 pub(super) struct Commits<'w, 's> {
     pub settings: Res<'w, BurrowSettings>,
@@ -208,7 +208,7 @@ pub(super) fn commit_begun(
             continue;
         }
         let Ok((_, _, _, mut task, _)) = commits.terrains.get_mut(entity) else { continue };
-        // Where transactions take longer, as they do with colliders on a slow machine, waiting would be in vain.
+        // Where transactions take longer, as they do with colliders on a slow machine, waiting would not help.
         let left = most.saturating_sub(start.elapsed());
         let wait = if usual <= begun.elapsed() + left { left } else { Duration::ZERO };
         if task.is_done_within(wait) && task.is_plain() {
@@ -222,8 +222,9 @@ pub(super) fn commit_begun(
     }
 }
 
-/// Commits one task's output, and says whether it did. A transaction that the game abandoned is refused; its edits wait
-/// in the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a rejection.
+/// Commits one task's output, and returns whether it did. A transaction that the game abandoned is refused; its edits
+/// wait in the queue again. If the task panicked, nothing changes, and its brushes and steps are answered with a
+/// rejection.
 fn commit(
     (entity, ticket): (Entity, Option<u64>),
     mut terrain: Mut<Terrain>,

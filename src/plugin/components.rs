@@ -46,7 +46,7 @@ pub struct Tile {
     pub x: i32,
     /// Chunks along +z.
     pub z: i32,
-    /// Its level of detail; always 0 without [`LevelsOfDetail`](super::LevelsOfDetail).
+    /// The tile's level of detail; always 0 without [`LevelsOfDetail`](super::LevelsOfDetail).
     pub level: u8,
 }
 
@@ -84,7 +84,7 @@ pub struct MeshBytes(pub usize);
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
 #[reflect(Component)]
 pub struct Field {
-    /// Its id in receipts.
+    /// The field's id in receipts.
     pub id: u64,
     /// Lowest edited lattice point, in voxels of the terrain.
     pub min: IVec3,
@@ -161,7 +161,7 @@ impl From<ChunkPos> for Chunk {
 }
 
 impl From<Tile> for TilePos {
-    /// Its lowest tile.
+    /// Returns the lowest tile.
     fn from(Tile { x, z, .. }: Tile) -> Self {
         Self { x, z }
     }

@@ -26,8 +26,8 @@ pub struct BurrowFigures {
     pub transactions: Times,
     /// How long the latest commits took on the main thread.
     pub commit_times: Times,
-    /// How long showing loaded terrains, collecting brushes, committing and starting transactions took together on the main
-    /// thread in this frame: systems, and changes to entities.
+    /// How long showing loaded terrains, collecting brushes, committing and starting transactions took together on the
+    /// main thread in this frame: systems, and changes to entities.
     pub main_thread: Duration,
     /// How long showing loaded terrains took in this frame, until it is part of [`main_thread`](Self::main_thread).
     #[reflect(ignore)]

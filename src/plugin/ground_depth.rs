@@ -36,7 +36,7 @@ pub(super) struct NodeHeights {
 }
 
 impl NodeHeights {
-    /// Those of columns from `low` to `high`, both included.
+    /// Computes the heights of columns from `low` to `high`, both included.
     pub fn new(ground: &Ground, (low, high): (Column, Column), stride: i32) -> Self {
         let count = |low: i32, high: i32| ((high - low).max(0) as usize).div_ceil(stride as usize) + 1;
         let [width, depth] = [count(low.x, high.x), count(low.z, high.z)];

@@ -45,7 +45,8 @@ pub struct GroundDescription {
     pub import: ImportOptions,
     /// How tiles meet.
     pub tiles: TileEdges,
-    /// The scale. `None`: voxels of one metre, and samples as far apart as the first file says, or a voxel if it says nothing.
+    /// The scale. `None`: voxels of one metre, and samples as far apart as the first file says, or a voxel if it says
+    /// nothing.
     pub scale: Option<ElevationScale>,
     /// The materials. `None`: material 0 everywhere.
     pub materials: Option<MaterialFiles>,
@@ -106,7 +107,7 @@ pub enum GroundFileError {
     )]
     NoPlace(String),
     /// The path of a file is invalid.
-    #[error("`{0}` is no path of a file: {1}")]
+    #[error("`{0}` is not a valid file path: {1}")]
     Path(String, ParseAssetPathError),
     /// A file can't be read.
     #[error("reading `{0}`: {1}")]
@@ -337,7 +338,7 @@ fn follow_ground_files(
                     tell(Ok(report.clone()));
                 }
                 Err(error) => {
-                    error!("no terrain is made of the ground of {entity}: {error}");
+                    error!("no terrain can be made from the ground of {entity}: {error}");
                     failed.insert(entity, hash);
                     tell(Err(error.to_string()));
                 }

@@ -67,7 +67,7 @@ impl Requests<'_> {
 /// Stores messages of this frame. Runs in every frame, regardless of the game's run conditions.
 pub(super) fn keep_requests(mut requests: Requests) {
     let Requests { inbox, brushes, targeted, undos, redos } = &mut requests;
-    // For other systems this is no change.
+    // Other systems do not see this as a change.
     let inbox = inbox.bypass_change_detection();
     inbox.brushes.keep(brushes);
     inbox.targeted.keep(targeted);

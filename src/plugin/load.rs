@@ -85,7 +85,7 @@ pub(super) fn start_loading(
         }
         let extras = VertexExtras::of(colors, kind);
         let builder = build.builder((entity, &terrain), extras);
-        // For the game this is no change.
+        // The game does not see this as a change.
         let model = terrain.bypass_change_detection();
         let pending = entities_of_kind.and_then(|entities| model.take_pending_display(entities.shown));
         // If more has changed than a frame may swap, the terrain is loaded again over several frames.
@@ -317,7 +317,7 @@ mod tests {
             };
             loaded(terrain, done, &mut failures).is_some()
         };
-        assert!(!end(false) && end(true), "once is no trouble");
+        assert!(!end(false) && end(true), "one failure does not end it");
         assert_eq!([(); 3].map(|()| end(false)), [false, false, true], "it ends");
         assert_eq!([(); 3].map(|()| end(false)), [false, false, true], "another time too");
     }

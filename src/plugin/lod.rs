@@ -34,7 +34,7 @@ const EDITS: u32 = 2;
 /// The height of a picture whose camera has none yet, in pixels.
 const HEIGHT: f32 = 1080.0;
 
-/// Its width.
+/// The width of such a picture, in pixels.
 const WIDTH: f32 = 1920.0;
 
 /// How a camera draws, in its own space and in metres.
@@ -228,7 +228,7 @@ pub(super) fn begin_lod_changes(
         let chosen = eyes.clone();
         let choose: Arc<ChooseCut> =
             Arc::new(move |world, cut| known.next_cut(world, cut, &choice, &chosen, most));
-        // For the game this is no change.
+        // The game does not see this as a change.
         let Some(transaction) = terrain.bypass_change_detection().begin_cut_for(choose, true) else {
             continue;
         };

@@ -29,8 +29,8 @@ use crate::terrain::{KnownNodes, Version};
 /// Levels are chosen for all of these cameras together. While there is none, levels stay as they are. Distances and
 /// speeds are measured in the terrain's own space and in real time, so shifted origins and slow motion change nothing.
 ///
-/// The defaults need no change. Values of 0, negative ones and NaN are allowed: `max_nodes` bounds what they can cost. A
-/// terrain that gets or loses this component is loaded again.
+/// The defaults need no change. Values of 0, negative ones and NaN are allowed: `max_nodes` bounds what they can cost.
+/// A terrain that gets or loses this component is loaded again.
 ///
 /// With it, a [`Tile`](super::Tile) has an entity while it is drawn, and of level 0 also while something else needs it,
 /// like a collider. [`SurfaceProcessor`](super::SurfaceProcessor)s are called for tiles and chunks of level 0 only,
@@ -39,8 +39,8 @@ use crate::terrain::{KnownNodes, Version};
 #[reflect(Component, Default)]
 #[require(ShownLevels, Watchers)]
 pub struct LevelsOfDetail {
-    /// Metres; ground farther away from all cameras is drawn at the coarsest level that the rest allows. With 0 or less, all
-    /// ground is.
+    /// Metres; ground farther away from all cameras is drawn at the coarsest level that the rest allows. With 0 or
+    /// less, all ground is.
     pub view_distance: f32,
     /// Ground is drawn finer while it would differ by more than this many pixels from the next finer level, and its
     /// cells are larger than [`cell_pixels`](Self::cell_pixels). Less than 0.01 counts as

@@ -427,7 +427,7 @@ mod tests {
     #[test]
     fn depths_of_a_node_are_those_of_the_ground_wherever_its_vertices_lie() {
         let noise = NoiseHeights { seed: 4, scale: 30.0, amplitude: 20.0, ..NoiseHeights::default() };
-        // Widths that are no multiple of any stride.
+        // Widths that are not a multiple of any stride.
         let ground = Ground::from_source(157, 93, NoiseSource::new(&noise).unwrap()).unwrap();
         let digs: Vec<Brush> = (0..12)
             .map(|i| (i * 37 % 157, i * 23 % 93))

@@ -100,9 +100,9 @@ pub struct LoosePieceFound {
     pub terrain: Entity,
     /// The brush's tag.
     pub tag: u64,
-    /// Its bounds, voxels, materials and, if it broke off, its surface.
+    /// The piece: bounds, voxels, materials and, if it broke off, its surface.
     pub piece: LoosePiece,
-    /// Its mesh, built in the transaction's task; `None` if there are no meshes.
+    /// The piece's mesh, built in the transaction's task; `None` if there are no meshes.
     #[reflect(ignore, clone)]
     pub(super) mesh: Option<Arc<Mesh>>,
 }

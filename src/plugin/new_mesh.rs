@@ -34,7 +34,8 @@ impl PendingMesh {
         true
     }
 
-    /// The handle under which it is shown: a former one, or one of its own if it was uploaded or there is no former one.
+    /// The handle under which it is shown: a former one, or one of its own if it was uploaded or there is no former
+    /// one.
     pub fn show(self, assets: &mut Assets<Mesh>, former: Option<&Handle<Mesh>>) -> Handle<Mesh> {
         match (self.mesh, former) {
             (Stage::Uploaded(handle), _) => handle,

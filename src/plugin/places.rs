@@ -149,8 +149,8 @@ fn is_same_place(a: &GlobalTransform, b: &GlobalTransform) -> bool {
     a.translation.abs_diff_eq(b.translation, 1e-5 * size) && a.matrix3.abs_diff_eq(b.matrix3, 1e-5 * scale)
 }
 
-/// The side of a voxel in world space, in metres, including the scale of parents; the longest side if they stretch it. Always
-/// positive.
+/// The side of a voxel in world space, in metres, including the scale of parents; the longest side if they stretch it.
+/// Always positive.
 pub(crate) fn voxel_metres(place: &GlobalTransform) -> f32 {
     let matrix = place.affine().matrix3;
     let sides = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(Vec3A::length);

@@ -148,7 +148,7 @@ pub(super) struct BuiltSurface {
 /// The new mesh of a node.
 pub(super) struct BuiltNode {
     pub node: Node,
-    /// Its own mesh; `None` if it is drawn by its tile and chunks, or not at all.
+    /// The node's own mesh; `None` if the node is drawn by its tile and chunks, or not at all.
     pub mesh: Option<Option<PendingMesh>>,
     /// Tile and chunks that are drawn from now on.
     pub shown: Vec<BuiltSurface>,

@@ -110,8 +110,8 @@ impl Terrains<'_, '_> {
         highest.map(|(_, _, spans)| spans).unwrap_or_default()
     }
 
-    /// The stretches of air of one terrain over (x, z), lowest first, in metres; none if its y axis does not point straight
-    /// up.
+    /// The stretches of air of one terrain over (x, z), lowest first, in metres; none if its y axis does not point
+    /// straight up.
     #[cfg(feature = "egui")]
     pub(crate) fn spans_on(&self, terrain: Entity, x: f32, z: f32) -> Vec<Span> {
         let spans = self.terrains.get(terrain).ok().and_then(|own| spans_of(own.1, own.2, x, z));

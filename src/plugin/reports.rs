@@ -11,20 +11,20 @@ use crate::terrain::Terrain;
 /// Something that is logged once for each terrain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Report {
-    /// Its place is not finite, or a scale is 0.
+    /// The terrain's place is not finite, or a scale is 0.
     NoPlace,
-    /// A parent mirrors it.
+    /// A parent mirrors the terrain.
     Mirrored,
-    /// A parent stretches it.
+    /// A parent stretches the terrain.
     Stretched,
-    /// Seams may show where it stands.
+    /// Seams may show where the terrain stands.
     Unaligned,
-    /// The game gave it a scale.
+    /// The game gave the terrain a scale.
     ScaleReplaced,
-    /// It has materials of several types.
+    /// The terrain has materials of several types.
     #[cfg(feature = "render")]
     SeveralMaterials,
-    /// It has no material.
+    /// The terrain has no material.
     #[cfg(feature = "render")]
     NoMaterial,
     /// Applying a brush panicked.
@@ -35,11 +35,11 @@ pub(crate) enum Report {
     BrushInvalid,
     /// The first brushes reach no terrain.
     BrushBeside,
-    /// It is too far from the origin, where numbers are coarse.
+    /// The terrain is too far from the origin, where numbers are coarse.
     Far,
-    /// It has levels of detail, and no camera looks at it.
+    /// The terrain has levels of detail, and no camera looks at it.
     NobodyLooks,
-    /// It has a material with textures, and no texture coordinates.
+    /// The terrain has a material with textures, and no texture coordinates.
     #[cfg(feature = "render")]
     Textures,
 }

@@ -43,9 +43,9 @@ pub(crate) fn squares_within(
 
 /// The squares around positions.
 pub(crate) struct Squares<K> {
-    /// Those to be loaded, with their distance to the nearest position.
+    /// Squares to be loaded, with their distance to the nearest position.
     wanted: HashMap<K, f32>,
-    /// Those, and some more that stay if they are loaded.
+    /// The wanted squares, and some more that stay if they are loaded.
     pub kept: HashSet<K>,
 }
 

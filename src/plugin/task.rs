@@ -22,8 +22,8 @@ use crate::terrain::{
 use crate::threads::{ThreadTask, Threads};
 use crate::world::sky::{LitWorld, REACH};
 
-/// Meshes of large results that are passed to the renderer in a frame, before all of them are shown in one. A result with no more
-/// meshes is shown at once.
+/// Meshes of large results that are passed to the renderer in a frame, before all of them are shown in one. A result
+/// with no more meshes is shown at once.
 pub(super) const UPLOADS_PER_FRAME: usize = 64;
 
 /// The running task of a terrain.
@@ -120,8 +120,8 @@ impl InFlight {
                 builder = builder.lit_by(&Arc::new(LitWorld::new(Arc::clone(&world), Vec::new())));
             }
             let drafts = drawn.iter().map(|&drawn| (drawn, world.draft(drawn))).collect();
-            // Nodes are made from all of the world. Where there are none it is dropped here: commits copy the index of a
-            // world that others hold.
+            // Nodes are made from all of the world. Where there are none it is dropped here: commits copy the index of
+            // a world that others hold.
             let cut = cut.map(|cut| (world, cut));
             let surfaces = builder.build_all(drafts, cut.as_ref().map(|(_, cut)| cut.as_ref()));
             let nodes =
@@ -151,7 +151,8 @@ impl InFlight {
         output.surfaces.len() + output.nodes.iter().map(BuiltNode::swaps).sum::<usize>()
     }
 
-    /// Passes meshes of its result to the renderer, as many as are left of a frame's budget. Returns whether it has all.
+    /// Passes meshes of its result to the renderer, as many as are left of a frame's budget. Returns whether it has
+    /// all.
     pub fn upload(&mut self, assets: &mut Assets<Mesh>, budget: &mut usize) -> bool {
         let Some(Ok(output)) = &mut self.done else { return true };
         let surfaces = output.surfaces.iter_mut().filter_map(|built| built.mesh.as_mut());

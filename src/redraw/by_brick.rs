@@ -137,7 +137,7 @@ impl Bits {
     }
 }
 
-/// Those of the bricks that hold cells of boxes whose x lies in a range.
+/// The bricks that hold cells of the changes' boxes and whose x lies in a range.
 fn within(xs: RangeInclusive<i32>, changes: Vec<Reached>) -> Vec<BrickCells> {
     let bricks_of = |cells: LatticeBox| {
         let LatticeBox { min, max } = BrickPos::range(cells);
@@ -183,7 +183,7 @@ struct BrickColumn {
 }
 
 impl BrickColumn {
-    /// Those of the brick at this height.
+    /// The bits of the brick at this height.
     fn bits(&self, y: i32) -> u32 {
         let [low, high] = self.cells;
         let may_join = self.joining.is_some_and(|[low, high]| low <= y && y <= high);

@@ -24,7 +24,7 @@ pub struct DrawnCut {
 }
 
 impl DrawnCut {
-    /// Its nodes.
+    /// The nodes of the cut.
     pub fn cut(&self) -> &Cut {
         &self.cut
     }
@@ -40,7 +40,8 @@ impl DrawnCut {
 pub struct NodeUpdate {
     /// The node.
     pub node: Node,
-    /// Its own mesh, relative to its lowest column at y = 0; `None` if it is drawn by its tile and chunks, or not at all.
+    /// The node's own mesh, relative to its lowest column at y = 0; `None` if the node is drawn by its tile and chunks,
+    /// or not at all.
     pub mesh: Option<Arc<SurfaceMesh>>,
     /// Tile and chunks that are drawn from now on.
     pub(crate) shown: Vec<(MeshKey, SurfaceDraft)>,

@@ -58,8 +58,8 @@ impl KnownNodes {
         self.facts.read().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// One step of `most` meshes at most, or of one change, towards the cut that these eyes need. Nodes that were not drawn
-    /// yet, and so are not known, are not split: what is coarse comes first.
+    /// One step of `most` meshes at most, or of one change, towards the cut that these eyes need. Nodes that were not
+    /// drawn yet, and so are not known, are not split: what is coarse comes first.
     pub fn next_cut(
         &self,
         world: &World,
@@ -107,7 +107,8 @@ impl KnownNodes {
         next
     }
 
-    /// Forgets nodes that are neither in this cut nor above it, once more than `most` and many more than these are known.
+    /// Forgets nodes that are neither in this cut nor above it, once more than `most` and many more than these are
+    /// known.
     fn forget(&self, cut: &Cut, most: usize) {
         if self.read().len() > most.max(8 * cut.nodes().count()) {
             let mut facts = self.facts.write().unwrap_or_else(PoisonError::into_inner);

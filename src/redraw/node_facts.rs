@@ -13,14 +13,14 @@ const WIDEST: i32 = 4096;
 /// The part of a node's [`NodeFacts`] that depends on the ground alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GroundFacts {
-    /// Its lowest and its highest point, in voxels.
+    /// The node's lowest and highest point, in voxels.
     pub heights: [f32; 2],
-    /// Greatest distance of its heightmap from the heights at half its stride, in voxels; 0 at level 0.
+    /// Greatest distance of the node's heightmap from the heights at half its stride, in voxels; 0 at level 0.
     pub error: f32,
 }
 
 impl GroundFacts {
-    /// Those of a node.
+    /// Computes the facts of a node.
     pub fn new(ground: &Ground, grid: LodGrid, node: Node) -> Self {
         if !grid.has(node) {
             return Self::default();

@@ -18,7 +18,8 @@ use crate::world::{MeshKey, World};
 pub(crate) type NewParts<'a> = (&'a [(TilePos, TileUpdate)], &'a [(ChunkPos, Arc<ChunkSurface>)]);
 
 impl World {
-    /// A cut as it is drawn, and all meshes for it. In place of a cut of a world of another size, the coarsest is drawn.
+    /// A cut as it is drawn, and all meshes for it. In place of a cut of a world of another size, the coarsest is
+    /// drawn.
     pub fn draw_cut(&self, cut: Cut) -> (DrawnCut, Vec<NodeUpdate>) {
         let cut = if self.has_cut(&cut) { cut } else { Cut::coarsest(self.lod_grid(u8::MAX)) };
         let mut nodes: Vec<Node> = cut.nodes().collect();
@@ -73,8 +74,8 @@ pub(crate) fn change_cut(world: &World, drawn: &Arc<DrawnCut>, choose: &ChooseCu
     (Arc::new(drawn.after(cut, &updates)), updates)
 }
 
-/// The nodes that show changed cells over these columns, drawn as they are in the view of a running transaction, which changes
-/// these bricks.
+/// The nodes that show changed cells over these columns, drawn as they are in the view of a running transaction, which
+/// changes these bricks.
 pub(crate) fn redraw_changed(
     world: &World,
     view: &WorldView,

@@ -1,7 +1,7 @@
 //! Surfaces whose light a commit changes, though their shape stays.
 //!
-//! Light depends on the ground within a bounded distance, so only what is near changed bricks can differ. There, the light of
-//! each vertex is compared before and after.
+//! Light depends on the ground within a bounded distance, so only what is near changed bricks can differ. There, the
+//! light of each vertex is compared before and after.
 
 use glam::IVec3;
 use rustc_hash::{FxHashMap, FxHashSet};
@@ -14,7 +14,8 @@ use crate::surface::lod;
 use crate::world::sky::{ChangedBox, LightChange, LitWorld, REACH, SkyLights, SkyView, SparseSky};
 use crate::world::{MeshKey, World};
 
-/// Rectangles of columns of at most this many along a side are compared as one, and with larger ones each tile for itself.
+/// Rectangles of columns of at most this many along a side are compared as one, and with larger ones each tile for
+/// itself.
 const MAX_TOGETHER: i32 = 128;
 
 /// The tiles that draw columns whose light may change.
@@ -90,7 +91,7 @@ pub(crate) fn relit_parts(lit: &LitWorld, is_redrawn: impl Fn(MeshKey) -> bool +
 }
 
 impl Unchanged {
-    /// Those whose light differs.
+    /// The unchanged meshes whose light differs.
     fn relit(&self, world: &World, change: &mut LightChange) -> Vec<MeshKey> {
         let (mut found, tile) = (Vec::new(), self.tile);
         if self.is_tile_drawn {

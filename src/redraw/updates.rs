@@ -160,7 +160,7 @@ struct ByChunk {
 /// Blocks of a chunk.
 struct OfChunk {
     chunk: ChunkPos,
-    /// Their number.
+    /// The number of blocks.
     count: usize,
     /// One more than the greatest of their numbers.
     end: usize,

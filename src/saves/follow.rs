@@ -15,7 +15,7 @@ pub(super) fn follow_same(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
 /// Sends new commits of a terrain to the store, or the whole terrain if it is another one.
 pub(super) fn follow(terrain: &mut Mut<Terrain>, world: &mut WorldStore) {
     let Some(store) = &mut world.store else { return };
-    // For the game this is no change of the terrain.
+    // The game does not see this as a change of the terrain.
     let followed = store.follow(terrain.bypass_change_detection());
     match followed {
         Err(why) if !std::mem::replace(&mut world.has_failed, true) => {

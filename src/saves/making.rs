@@ -82,7 +82,7 @@ pub(super) fn start_levels(
         match made {
             Ok(Ok(mut made)) => {
                 if let Err(why) = made.adopt_settings(terrain.edit_settings()) {
-                    error!("the rules of {entity} could not be applied to its level: {why}");
+                    error!("the terrain's rules could not be applied to the level of {entity}: {why}");
                 }
                 made.take_over(&mut terrain);
                 free_later(std::mem::replace(&mut *terrain, made));

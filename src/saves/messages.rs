@@ -64,14 +64,14 @@ pub struct WorldClosed {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ClosedBecause {
-    /// Its [`SavedWorld`](super::SavedWorld) was removed or replaced, or its entity despawned.
+    /// The [`SavedWorld`](super::SavedWorld) was removed or replaced, or its entity despawned.
     #[default]
     Removed,
     /// A [`Terrain`](crate::terrain::Terrain) over another ground, or of another size, was put in place of its own. Its
     /// `SavedWorld` was removed, and nothing was written of that terrain: insert another `SavedWorld` with it to save
     /// that.
     OtherTerrain,
-    /// Its terrain is shared from now on, and the server saves what players share. Its `SavedWorld` was removed.
+    /// The terrain is shared from now on, and the server saves what players share. The `SavedWorld` was removed.
     Shared,
 }
 

@@ -7,7 +7,6 @@
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
-use bevy::window::ExitSystems;
 //! # use bevy_burrow::prelude::*;
 //! fn continue_game(mut commands: Commands) -> Result {
 //!     let ground = Ground::from_noise(512, 512, &NoiseHeights::default())?;
@@ -44,6 +43,7 @@ pub use reading::OpeningWorld;
 pub(crate) use reading::{ReadWorld, WorldReader};
 
 use bevy::prelude::*;
+use bevy::window::ExitSystems;
 
 use crate::plugin::{BeforeLoad, BurrowSystems, register_loader};
 

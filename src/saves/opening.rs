@@ -117,8 +117,8 @@ pub(super) fn start_opening(
             Some(Ok(None)) => continue,
             Some(Ok(Some(level))) => Some((level.clone(), levels.path_of(start))),
         };
-        // For the game this is no change. A new world is made of the terrain as it is now, and what is committed from
-        // now on follows.
+        // The game does not see this as a change. A new world is made of the terrain as it is now, and what is
+        // committed from now on follows.
         let terrain = terrain.bypass_change_detection();
         terrain.abandon();
         // A new log says the rules of edits that wait.
@@ -203,7 +203,7 @@ pub(super) fn finish_opening(
                 Found::Old(ReadWorld { store, terrain: mut read, warnings }) => {
                     warnings.into_iter().for_each(&mut report);
                     if now != opening.version {
-                        warn!("what the game did to {entity} while its world was read is not in that");
+                        warn!("changes to {entity} while its saved world was being read were discarded");
                     }
                     read.take_over(&mut terrain);
                     free_later(std::mem::replace(&mut *terrain, read));

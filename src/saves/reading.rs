@@ -99,7 +99,7 @@ pub(crate) struct ReadWorld {
 pub(super) enum Found {
     /// An existing world.
     Old(ReadWorld),
-    /// There was none, and it was made of the terrain.
+    /// A new world, created from the terrain.
     New(ReadWorld),
 }
 
@@ -173,7 +173,7 @@ impl WorldReader {
         let (store, opened) = Store::open(folder.path(), Arc::clone(ground), options)?;
         let (mut terrain, warnings) = (opened.terrain, opened.warnings);
         if let Err(why) = terrain.adopt_settings(edit_settings) {
-            error!("the rules of the terrain could not be applied to its saved world: {why}");
+            error!("the terrain's rules could not be applied to its saved world: {why}");
         }
         Ok(Found::Old(ReadWorld { store, terrain, warnings }))
     }

@@ -1,8 +1,8 @@
 //! Plants and stones on the ground: where each one stands, and whether it still does.
 //!
-//! [`ScatterRules`] describe species. A [`Scatter`] made from them answers where their plants are: a pure function of seed,
-//! species and the undug ground, in integers. It is the same on every machine, for every chunk size and level of detail, and
-//! nothing of it is saved or sent.
+//! [`ScatterRules`] describe species. A [`Scatter`] made from them answers where their plants are: a pure function of
+//! seed, species and the undug ground, in integers. It is the same on every machine, for every chunk size and level of
+//! detail, and nothing of it is saved or sent.
 //!
 //! A plant stands exactly as long as
 //!
@@ -12,9 +12,9 @@
 //! So a plant disappears when the ground under it or in its clearance changes, and returns when undo or a
 //! [reset](crate::brush::Brush::reset) restores that ground. It never hangs in the air or stands in the ground.
 //!
-//! To remove a plant, mark the ground under it: [`Plant::removal`] is a brush that paints one sample with the ground's own
-//! material. Nothing looks different, and the plant is gone, together with what grows within a voxel of that sample. As it is a
-//! brush like any other, it is saved, sent, undone and refused like any other.
+//! To remove a plant, mark the ground under it: [`Plant::removal`] is a brush that paints one sample with the ground's
+//! own material. Nothing looks different, and the plant is gone, together with what grows within a voxel of that
+//! sample. As it is a brush like any other, it is saved, sent, undone and refused like any other.
 //!
 //! ```
 //! use bevy_burrow::prelude::*;

@@ -24,9 +24,9 @@ pub struct PatchPos {
 /// A plant that disappeared or returned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlantChange {
-    /// Its patch.
+    /// The plant's patch.
     pub patch: PatchPos,
-    /// Its index in the patch.
+    /// The plant's index in the patch.
     pub index: usize,
     /// The plant.
     pub plant: Plant,
@@ -111,7 +111,8 @@ impl PlantPatches {
         self.patches.remove(&pos)
     }
 
-    /// Checks the plants that may have gone or returned because these samples changed; all of them if `samples` is `None`.
+    /// Checks the plants that may have gone or returned because these samples changed; all of them if `samples` is
+    /// `None`.
     ///
     /// The time grows with the number of plants that are checked: those of the loaded patches within the
     /// [reach](Scatter::reach) of the box. The box may be larger than the world.
@@ -154,8 +155,8 @@ impl PlantPatches {
         found
     }
 
-    /// Plants of these patches that stand on cells of a rectangle, both corners included; of each species for which `wanted`
-    /// has `true`.
+    /// Plants of these patches that stand on cells of a rectangle, both corners included; of each species for which
+    /// `wanted` has `true`.
     pub fn near_of(
         &self,
         low: Column,
@@ -210,7 +211,8 @@ impl PlantPatch {
 }
 
 impl Scatter {
-    /// Cells along the sides of a species' patches: a power of two, about a quarter of the distance to which it is drawn.
+    /// Cells along the sides of a species' patches: a power of two, about a quarter of the distance to which it is
+    /// drawn.
     pub fn patch_size(&self, species: u8) -> i32 {
         let end = self.species().get(usize::from(species)).map_or(0.0, |own| own.view.end);
         ((end / 4.0) as u32).clamp(16, 128).next_power_of_two().min(128) as i32

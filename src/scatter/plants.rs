@@ -12,28 +12,28 @@ use crate::lattice::{Column, ONE, ceil};
 /// Identifies a plant; it stays the same as long as the ground and the rules of its species do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PlantId {
-    /// Its species, as an index of the rules.
+    /// The species, as an index of the rules.
     pub species: u8,
-    /// Its square along z, in spacings of the species.
+    /// The plant's square along z, in spacings of the species.
     pub z: i32,
-    /// Its square along x.
+    /// The plant's square along x, in spacings of the species.
     pub x: i32,
 }
 
 /// A plant on the undug ground. All numbers are integers, so equal plants are equal on every machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Plant {
-    /// Its id.
+    /// The plant's id.
     pub id: PlantId,
-    /// Its place along x, in 1/256 voxel.
+    /// Position along x, in 1/256 voxel.
     pub x: i32,
-    /// Its place along z, in 1/256 voxel.
+    /// Position along z, in 1/256 voxel.
     pub z: i32,
     /// The height of its foot, in 1/65536 voxel.
     pub y: i64,
     /// Rise of the ground under it along x and along z, in 1/256.
     pub rise: [i32; 2],
-    /// Its size, in 1/256.
+    /// The plant's size, in 1/256.
     pub size: u16,
     /// How far it is turned around its axis, in 1/65536 of a whole turn.
     pub turn: u16,
@@ -84,8 +84,9 @@ impl Plant {
         Shape::sphere(place.as_vec3(), 0.25)
     }
 
-    /// The brush that removes it, in voxels: it paints the one sample nearest to its foot with the ground's own material, which
-    /// changes nothing but that the sample counts as edited. Plants on the four cells around that sample go with it.
+    /// The brush that removes it, in voxels: it paints the one sample nearest to its foot with the ground's own
+    /// material, which changes nothing but that the sample counts as edited. Plants on the four cells around that
+    /// sample go with it.
     pub fn removal(&self) -> Brush {
         Brush::paint(self.mark(), MaterialId::GROUND)
     }
@@ -127,8 +128,8 @@ impl Scatter {
         &self.species
     }
 
-    /// The plants of the undug ground on the cells from `low` to `high`, both included, of the species that `is_wanted` accepts;
-    /// in order of their ids. An area gives the same plants whole or in parts.
+    /// The plants of the undug ground on the cells from `low` to `high`, both included, of the species that `is_wanted`
+    /// accepts; in order of their ids. An area gives the same plants whole or in parts.
     pub fn plants(
         &self,
         ground: &Ground,

@@ -41,8 +41,8 @@ impl Scatter {
 
     /// The plant whose foot is nearest to a place, at most `most` away, of the species that `is_wanted` accepts.
     ///
-    /// Ground is searched outwards, each cell once, up to 1,024 voxels from the column of the world that is nearest to the
-    /// place: where nothing stands within that distance, there is none.
+    /// Ground is searched outwards, each cell once, up to 1,024 voxels from the column of the world that is nearest to
+    /// the place: where nothing stands within that distance, there is none.
     pub fn nearest(
         &self,
         world: &World,

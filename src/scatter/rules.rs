@@ -31,14 +31,15 @@ pub struct ScatterRules {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Species {
-    /// Its name, which seeds where its plants stand. Its place in the list matters only for [`room`](Self::room).
+    /// The name, which seeds where the plants stand. The species' place in the list matters only for
+    /// [`room`](Self::room).
     pub name: String,
     /// Sides of the squares that have one spot each, 1/16 to 1024.
     pub spacing: f32,
     /// The share of spots that are used, 0 to 1.
     pub density: f32,
-    /// Least distance between two plants of this species, at most 4 times the spacing. Of two that are too near to each other,
-    /// one is left out.
+    /// Least distance between two plants of this species, at most 4 times the spacing. Of two that are too near to each
+    /// other, one is left out.
     pub distance: f32,
     /// Species that come later in the list keep this distance, at most 64.
     pub room: f32,
@@ -52,11 +53,11 @@ pub struct Species {
     pub materials: Vec<MaterialId>,
     /// Groups in which it grows; everywhere if `None`.
     pub clusters: Option<Clusters>,
-    /// What must stay as it is for the plant to stand.
+    /// The space that must stay as it is for the plant to stand.
     pub clearance: Clearance,
-    /// What bodies and rays meet; `None` if they pass through.
+    /// The cylinder that bodies and rays meet; `None` if they pass through.
     pub stem: Option<Stem>,
-    /// How far it is drawn.
+    /// How far the species is drawn.
     pub view: ViewDistances,
 }
 
@@ -111,9 +112,9 @@ pub struct Clearance {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stem {
-    /// Its radius, 1/256 to 16.
+    /// The stem's radius, 1/256 to 16.
     pub radius: f32,
-    /// Its height above the plant's foot, 1/256 to 256.
+    /// The stem's height above the plant's foot, 1/256 to 256.
     pub height: f32,
 }
 
@@ -146,7 +147,7 @@ pub enum ScatterError {
         species: String,
         /// The field.
         what: &'static str,
-        /// Its value.
+        /// The value of the field.
         value: f32,
         /// The range.
         allowed: &'static str,

@@ -8,13 +8,13 @@ use crate::lattice::{Column, ONE, ceil};
 /// A point where a plant may stand, with what is random about it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Spot {
-    /// Its square.
+    /// The square that the spot lies in.
     pub square: (i32, i32),
     /// In 1/256 voxel.
     pub x: i32,
     /// In 1/256 voxel.
     pub z: i32,
-    /// Of two that are too near to each other, the greater one stays.
+    /// The priority: of two spots that are too near to each other, the one with the greater number stays.
     priority: u64,
     /// Two more random numbers, as bits.
     pub random: u64,
@@ -95,8 +95,8 @@ pub(super) fn nearest_column(x: i32, z: i32) -> Column {
     Column::new((x + ONE / 2).div_euclid(ONE), (z + ONE / 2).div_euclid(ONE))
 }
 
-/// The chance of a spot by the groups around it: certain in the inner half of a group's area, falling to 0 at one and a half
-/// times that area.
+/// The chance of a spot by the groups around it: certain in the inner half of a group's area, falling to 0 at one and a
+/// half times that area.
 fn chance(rule: &Rule, at: (i32, i32)) -> i64 {
     let Some((size, squared_radius)) = rule.clusters else { return WHOLE };
     let own = (at.0.div_euclid(size), at.1.div_euclid(size));
@@ -147,7 +147,7 @@ impl Spots {
         Self { spots, ..all }
     }
 
-    /// All of them, by square.
+    /// All spots, by square.
     pub fn iter(&self) -> impl Iterator<Item = &Spot> {
         self.spots.iter().flatten()
     }

@@ -10,8 +10,8 @@ use crate::terrain::World;
 use crate::volume::Sample;
 
 impl Scatter {
-    /// Whether a plant of this scatter stands in a world: its cell is drawn as heightmap, and in its clearance the ground is
-    /// there and the air is free.
+    /// Whether a plant of this scatter stands in a world: its cell is drawn as heightmap, and in its clearance the
+    /// ground is there and the air is free.
     pub fn stands(&self, world: &World, plant: &Plant) -> bool {
         let Some(rule) = self.rules.get(usize::from(plant.id.species)) else { return false };
         if world.stacks.is_empty() {
@@ -24,9 +24,10 @@ impl Scatter {
         !world.mask().contains(plant.cell()) && has_clearance(rule, world, plant)
     }
 
-    /// Whether a plant of this scatter is gone although the ground at its foot and in its clearance is the one it grew on: its
-    /// [`removal`](Plant::removal), that of a neighbour, or a coat of [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND)
-    /// took it away. Returns `false` for a plant that stands, and for one whose ground was dug, built over or painted.
+    /// Whether a plant of this scatter is gone although the ground at its foot and in its clearance is the one it grew
+    /// on: its [`removal`](Plant::removal), that of a neighbour, or a coat of
+    /// [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND) took it away. Returns `false` for a plant that stands,
+    /// and for one whose ground was dug, built over or painted.
     pub fn is_felled(&self, world: &World, plant: &Plant) -> bool {
         let Some(rule) = self.rules.get(usize::from(plant.id.species)) else { return false };
         let (cell, sheet) = (plant.cell(), cell_sheet(world.ground(), plant.cell()));

@@ -61,7 +61,7 @@ impl BaseLevel {
         Self { name: LevelName { label: label.into(), hash: hash.digest() }, level }
     }
 
-    /// Its name.
+    /// The name of the level.
     pub fn name(&self) -> &LevelName {
         &self.name
     }

@@ -36,7 +36,7 @@ impl Checkpoint {
         Self { frame, metadata, regions, level, cells: None }
     }
 
-    /// Its bytes; empty if it can't be encoded, which never happens.
+    /// Encodes the checkpoint; empty if it can't be encoded, which never happens.
     pub fn encode(&self) -> Vec<u8> {
         let regions: Vec<Entry> =
             self.regions.iter().map(|(at, revision)| (at.0.to_array(), *revision)).collect();

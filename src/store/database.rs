@@ -31,7 +31,7 @@ pub(super) type Change = (Vec<u8>, Option<Vec<u8>>);
 /// Why a database can't be used.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum DatabaseError {
-    /// There is none.
+    /// There is no database.
     #[error("the file {DATABASE} is missing")]
     Missing,
     /// The system returned an error.
@@ -40,7 +40,7 @@ pub(super) enum DatabaseError {
     /// A newer version of the database's format.
     #[error("the file {DATABASE} has the format {0}, which is newer than {FILE_FORMAT}")]
     Newer(u8),
-    /// It is damaged.
+    /// The database is damaged.
     #[error("the file {DATABASE} is damaged: {0}")]
     Damaged(String),
 }

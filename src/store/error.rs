@@ -59,19 +59,21 @@ pub enum StoreError {
         regions: usize,
     },
     /// The world is based on a level that was not given. Nothing is lost.
-    #[error("the world was begun on the level `{label}`, without which it can't be opened: give that level")]
+    #[error(
+        "the world was created from the level `{label}`, without which it can't be opened: give that level"
+    )]
     LevelMissing {
-        /// What the game called the level.
+        /// The name that the game gave the level.
         label: String,
     },
     /// The world is based on another level than the given one, or the level has changed since, and
     /// [`BaseChanged::Refuse`](super::BaseChanged::Refuse) is set. Nothing is lost.
     #[error(
-        "the world was begun on the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}: give that \
+        "the world was created from the level `{label}` with the hash {expected:#018x}; the one given has {found:#018x}: give that \
          level, or allow `base_changed`, which moves the world"
     )]
     LevelChanged {
-        /// What the game called the level.
+        /// The name that the game gave the level.
         label: String,
         /// The [hash](super::LevelName::hash) of the world's level.
         expected: u64,
@@ -84,7 +86,7 @@ pub enum StoreError {
     /// A part of a file takes more bytes than can be read, so it is neither read nor written.
     #[error("a part of the file takes {length} bytes, more than the {limit} that can be read")]
     TooLarge {
-        /// Its bytes.
+        /// Bytes of the part.
         length: u64,
         /// The most that can be read.
         limit: u64,
@@ -107,7 +109,7 @@ pub enum StoreError {
     #[error("the log does not reach back to the first commit, so the world can't be made of it alone")]
     LogNotWhole,
     /// The log does not lead to the world that it describes.
-    #[error("the log can't be replayed: {0}")]
+    #[error("replaying the log does not give the saved world: {0}")]
     LogRefused(String),
     /// Records do not follow those that were taken before.
     #[error("records are missing: the next one leads to revision {found}, and the store is at {at}")]
@@ -122,7 +124,7 @@ pub enum StoreError {
     OtherSize {
         /// The size of the saved world.
         saved: WorldSize,
-        /// That of the terrain.
+        /// The size of the terrain.
         given: WorldSize,
     },
     /// A server keeps the world of this terrain, and saves it.
@@ -187,7 +189,7 @@ impl StoreError {
 #[non_exhaustive]
 pub enum StoreWarning {
     /// The world can't be saved at present. Everything is kept in memory, and saving is retried.
-    #[error("saving fails, and is retried: {0}")]
+    #[error("saving failed and will be retried: {0}")]
     NotSaved(String),
     /// Saving works again.
     #[error("saving works again")]
@@ -221,7 +223,7 @@ pub enum StoreWarning {
         revision: u64,
         /// How much was left out.
         bytes: u64,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// Replaying the log does not give the hashes that it contains, so the rest of it was skipped.
@@ -231,7 +233,7 @@ pub enum StoreWarning {
         revision: u64,
         /// The mismatch.
         why: String,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// A damaged part was rebuilt, from the log or from other files; nothing is lost.
@@ -239,7 +241,7 @@ pub enum StoreWarning {
     Rebuilt {
         /// The damage, in words.
         what: String,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// A damaged region is lost: the ground there is in its first state.
@@ -250,7 +252,7 @@ pub enum StoreWarning {
     RegionLost {
         /// The region, as `x y z` in units of 64 voxels.
         region: String,
-        /// Where a copy of it is, below the world's folder; empty where there is none.
+        /// Where the copy is, below the world's folder; empty where there is none.
         quarantine: String,
     },
     /// The log is missing, with all commits that were in it only: the folder `journal` was removed after a crash.

@@ -77,15 +77,15 @@ impl<T: fmt::Debug + Send + Sync> Lock for T {}
 /// How a file is opened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Opening {
-    /// It must exist.
+    /// The file must exist.
     Existing,
-    /// It must not exist.
+    /// The file must not exist.
     New,
 }
 
 /// An open file. It is written at one place at a time.
 pub trait OpenFile: fmt::Debug + Send + Sync {
-    /// Its length, in bytes.
+    /// The file's length, in bytes.
     ///
     /// # Errors
     /// When the system refuses.

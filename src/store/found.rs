@@ -32,7 +32,7 @@ pub(super) struct RegionRecord {
     /// Hash of the ground below.
     pub ground: u64,
     world: WorldId,
-    /// Its bytes. Unpacked they may be far more.
+    /// The record's bytes. Unpacked they may be far more.
     sealed: Box<[u8]>,
     /// Whether it holds the differences from the level below instead of the whole region.
     is_change: bool,
@@ -58,7 +58,7 @@ impl RegionRecord {
         self.sealed.len()
     }
 
-    /// Its content, over a ground.
+    /// The record's content, over a ground.
     pub fn decode(&self, at: RegionPos, ground: &Ground) -> Result<Patch, FormatError> {
         let kind = if self.is_change { Kind::RegionChange } else { Kind::Region };
         let payload = frame::open(&self.sealed, kind, self.world, &keys::region(at), FRAME_LIMIT)?.payload;

@@ -23,11 +23,11 @@ use crate::terrain::{Terrain, TerrainSettings};
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct WorldInfo {
-    /// Its name.
+    /// The world's id.
     pub world: WorldId,
-    /// Its revision.
+    /// The world's revision.
     pub revision: u64,
-    /// Its hash at that revision.
+    /// The world's hash at that revision.
     pub hash: u64,
     /// The sizes of its chunks and voxels.
     pub settings: TerrainSettings,
@@ -149,7 +149,7 @@ fn journal_warnings(contents: &Contents, frame: u64, revision: u64) -> Vec<Strin
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct WorldCheck {
-    /// Its name.
+    /// The world's id.
     pub world: WorldId,
     /// The world as opening it would restore it.
     pub terrain: Terrain,

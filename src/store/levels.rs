@@ -22,7 +22,7 @@ pub enum RestoreLevelError {
     /// A file is damaged, or does not belong to a level.
     #[error(transparent)]
     Format(#[from] FormatError),
-    /// It does not fit the ground, or its settings are out of range.
+    /// The level does not fit the ground, or its settings are out of range.
     #[error(transparent)]
     Restore(#[from] RestoreError),
 }
@@ -69,7 +69,7 @@ impl Pending {
         let why = |why: String| FormatError::File { name: PENDING.into(), why };
         let pending: Self = serde_json::from_slice(&bytes).map_err(|error| why(error.to_string()))?;
         match pending.changed.iter().chain(&pending.removed).find(|name| !is_of_level(name)) {
-            Some(name) => Err(why(format!("`{name}` is none of a level's files")).into()),
+            Some(name) => Err(why(format!("`{name}` is not a file of a level")).into()),
             None => Ok(Some(pending)),
         }
     }

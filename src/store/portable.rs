@@ -36,7 +36,7 @@ pub fn to_bytes(
 /// A world that was read from bytes.
 #[derive(Debug)]
 pub struct Imported {
-    /// Its terrain. Nothing is meshed, and there is no history.
+    /// The imported terrain. Nothing is meshed, and there is no history.
     pub terrain: Terrain,
     /// The id of the world that it is a copy of.
     pub world: WorldId,

@@ -15,9 +15,9 @@ const MAX_BAD: usize = 256;
 /// The bytes of a file.
 #[derive(Debug, Default)]
 pub(super) struct FileBytes {
-    /// Its bytes, with zeros where they can't be read.
+    /// The bytes, with zeros where they can't be read.
     pub bytes: Vec<u8>,
-    /// Where they can't be read.
+    /// Where bytes can't be read.
     pub unreadable: Vec<Range<usize>>,
 }
 

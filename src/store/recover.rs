@@ -29,7 +29,7 @@ const RESTORE: u64 = 2;
 /// A recovered world.
 pub(super) struct Recovered {
     pub terrain: Terrain,
-    /// Its mirror, which knows the regions that differ from their records.
+    /// The mirror of the world, which knows the regions that differ from their records.
     pub mirror: Mirror,
     /// The last frame that it contains.
     pub frame: u64,

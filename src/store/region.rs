@@ -10,7 +10,7 @@ use crate::world::{Patch, Positions, State};
 /// The content of a region's record.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Region {
-    /// Its bricks.
+    /// The region's bricks.
     pub bricks: BTreeMap<BrickPos, Arc<Brick>>,
     /// The fields of the chunks whose lowest corners lie in it.
     pub fields: BTreeMap<ChunkPos, Fields>,

@@ -15,16 +15,16 @@ use super::quarantine;
 /// The treatment of the replaced file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Old {
-    /// It may be damaged: it is kept in quarantine.
+    /// The file may be damaged: it is kept in quarantine.
     Quarantined,
-    /// It held nothing that the new one does not hold.
+    /// The file held nothing that the new one does not hold.
     Removed,
 }
 
 /// A file that may be replaced.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Replaced<'a> {
-    /// Its path.
+    /// The file's path.
     pub path: &'a str,
     /// The path of one that is not complete yet.
     pub unfinished: &'a str,

@@ -105,7 +105,7 @@ pub(super) struct Frame {
     world: WorldId,
     /// The names of the content of its edits; `None` if these hold it whole.
     pub names: Option<Vec<ContentId>>,
-    /// Its bytes, which hold the commits. Unpacked they may be far more.
+    /// The frame's bytes, which hold the commits. Unpacked they may be far more.
     sealed: Box<[u8]>,
     /// Where its entry is in its segment.
     pub range: Range<usize>,
@@ -158,7 +158,7 @@ pub(super) struct Found {
     pub number: u64,
     /// The world that it says it belongs to.
     pub world: Option<WorldId>,
-    /// Its head as it is stored.
+    /// The segment's head as it is stored.
     head: Option<Box<[u8]>>,
     pub frames: Vec<Frame>,
     /// Parts that are not entries.

@@ -56,7 +56,7 @@ pub(super) fn settle(files: &dyn Files, contents: &Contents, recovered: &Recover
     }
     let next_frame = match &failed {
         None => recovered.frame + 1,
-        // Frames that are no part of the world may still be there.
+        // Frames that are not part of the world may still be there.
         Some(error) => {
             told.push(StoreWarning::NotSaved(error.to_string()));
             recovered.frame.max(contents.greatest_frame()) + 2

@@ -18,17 +18,17 @@ const MAX_KEPT: usize = 8;
 
 /// The records of a file.
 pub(super) enum Source {
-    /// All of it is as it was written.
+    /// All of the file is as it was written.
     Whole(Vec<(Vec<u8>, Vec<u8>)>),
-    /// It is damaged, and these valid records were found in it.
+    /// The file is damaged, and these valid records were found in it.
     Damaged {
         /// In words.
         what: String,
         records: Vec<(Vec<u8>, Vec<u8>)>,
     },
-    /// There is none.
+    /// There is no file.
     Missing,
-    /// None of it can be read at the moment.
+    /// Nothing of the file can be read at the moment.
     Unreadable(io::Error),
 }
 
@@ -63,7 +63,7 @@ impl Source {
         Ok(Self::Damaged { what, records: salvage(&bytes) })
     }
 
-    /// Its records.
+    /// The records of the file.
     pub fn into_records(self) -> Vec<(Vec<u8>, Vec<u8>)> {
         match self {
             Self::Whole(records) | Self::Damaged { records, .. } => records,
@@ -71,7 +71,7 @@ impl Source {
         }
     }
 
-    /// Its records.
+    /// The records of the file.
     pub fn records(&self) -> &[(Vec<u8>, Vec<u8>)] {
         match self {
             Self::Whole(records) | Self::Damaged { records, .. } => records,

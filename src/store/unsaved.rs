@@ -7,7 +7,7 @@ use std::io;
 
 use super::files::{Files, Opening};
 
-/// Its path.
+/// The path of the marker file.
 pub(super) const UNSAVED: &str = "unsaved";
 
 /// Records that a segment holds commits that may not be in a checkpoint.

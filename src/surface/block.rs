@@ -37,9 +37,9 @@ pub struct Block {
 pub struct Part {
     /// The block.
     pub block: Block,
-    /// Where its vertices end; they begin where those of the part before end.
+    /// Where the part's vertices end; they begin where those of the part before end.
     pub vertices: usize,
-    /// Where its indices end.
+    /// Where the part's indices end.
     pub indices: usize,
 }
 
@@ -47,7 +47,7 @@ pub struct Part {
 /// repeated in its neighbour, with the same bits.
 #[derive(Clone, Debug, Default)]
 pub struct Parts {
-    /// One for each block, in order.
+    /// One part for each block, in order.
     pub list: Vec<Part>,
     /// Vertices, local to their chunks.
     pub vertices: Vec<Vertex>,

@@ -15,9 +15,9 @@ pub struct ChunkSurface {
 #[derive(Clone, Copy, Debug)]
 struct Part {
     key: PartKey,
-    /// Where its vertices end; they begin where those of the part before end.
+    /// Where the part's vertices end; they begin where those of the part before end.
     vertices: usize,
-    /// Where its indices end.
+    /// Where the part's indices end.
     indices: usize,
 }
 

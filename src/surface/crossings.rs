@@ -33,7 +33,7 @@ pub(super) struct Edge {
 pub(super) struct Crossings {
     /// Along x, y and z.
     pub lists: [Vec<Edge>; 3],
-    /// Their solid ends, layer by layer; only where the ground's materials differ from voxel to voxel.
+    /// The solid ends of the edges, layer by layer; only where the ground's materials differ from voxel to voxel.
     pub ends: Option<[LayerBits; 9]>,
 }
 
@@ -251,8 +251,8 @@ impl Batch {
 /// 1/4096, halves up, and not at the ends.
 #[inline(always)]
 fn linear_steps(p: i32x4, q: i32x4) -> i32x4 {
-    // Next to 1.5 * 2^52, floats are the integers. A quotient that is no half is 2^-26 away from one at least, as its
-    // divisor is below 2^25; so the bias decides halves and nothing else.
+    // Next to 1.5 * 2^52, floats are the integers. A quotient that is not a half is 2^-26 away from one at least, as
+    // its divisor is below 2^25; so the bias decides halves and nothing else.
     const SHIFT: f64 = 6_755_399_441_055_744.0;
     const BIAS: f64 = 1.0 / (1 << 28) as f64;
     let (p, sum) = (p.abs(), p.abs() + q.abs());

@@ -44,7 +44,7 @@ impl Indices {
         }
     }
 
-    /// Their number.
+    /// The number of indices.
     pub fn len(&self) -> usize {
         match self {
             Self::U16(list) => list.len(),
@@ -57,7 +57,7 @@ impl Indices {
         self.len() == 0
     }
 
-    /// Each of them.
+    /// Each index.
     pub fn iter(&self) -> impl Iterator<Item = u32> {
         let (short, long) = self.lists();
         short.iter().map(|&index| u32::from(index)).chain(long.iter().copied())
@@ -140,7 +140,7 @@ mod tests {
 
     use super::*;
 
-    /// As many vertices as there may be at most for 16 bits, or one more.
+    /// The most vertices that 16-bit indices allow, or one more.
     fn vertices(is_long: bool) -> usize {
         Indices::MAX_SHORT + usize::from(is_long)
     }

@@ -36,8 +36,8 @@ impl MaterialMix {
         }
     }
 
-    /// The shares of the materials of some columns, each of which counts the same, in integers. The four with the largest
-    /// shares are kept.
+    /// The shares of the materials of some columns, each of which counts the same, in integers. The four with the
+    /// largest shares are kept.
     pub fn of_columns(columns: impl Iterator<Item = ColumnMaterial>) -> Self {
         let mut parts: Vec<(u8, i32)> = Vec::with_capacity(8);
         for column in columns {
@@ -149,7 +149,7 @@ impl TryFrom<Unchecked> for SurfaceMesh {
     fn try_from(of: Unchecked) -> Result<Self, Self::Error> {
         let vertices = of.vertices.len();
         if !of.indices.len().is_multiple_of(3) {
-            return Err("the indices of the mesh are no triangles");
+            return Err("the indices of the mesh do not form triangles");
         }
         if of.indices.iter().any(|&index| index as usize >= vertices) {
             return Err("the mesh has an index beyond its vertices");

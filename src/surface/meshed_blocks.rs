@@ -35,7 +35,7 @@ pub(crate) enum BlockVertices<'a> {
 }
 
 impl BlockVertices<'_> {
-    /// Their number.
+    /// The number of vertices.
     pub fn len(&self) -> usize {
         match self {
             Self::Made(vertices) => vertices.len(),
@@ -78,7 +78,7 @@ pub(crate) struct Group {
     pub count: usize,
     /// The number of the list.
     pub list: usize,
-    /// Where they begin in it.
+    /// Where the parts begin in the list.
     pub first: usize,
 }
 

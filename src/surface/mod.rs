@@ -1,13 +1,13 @@
 //! The drawn surface: marching cubes at edits, heightmap elsewhere, and the ring where they meet.
 //!
-//! - [`cases`]: the marching-cubes case table, derived from one rule about cube faces.
-//! - [`mask`]: which cells marching cubes draws (rule 2), as bits.
-//! - [`vertex`]: the one vertex function of cubes and ring (rule 4), with normals and materials.
-//! - [`block`]: marching cubes over up to 8x8x8 cells of one chunk; [`plain`] is the same by the book.
-//! - [`tile`]: the heightmap's triangles outside the mask, rings included (rule 3).
-//! - [`mesh`]: vertex and index buffers, local to a chunk or tile; [`indices`] has 16 or 32 bits each.
-//! - [`lod`]: the nodes of a quadtree cut, coarser ones included (rules 7 to 9).
-//! - [`seams`]: the validator: is everything drawn together closed?
+//! - `cases`: the marching-cubes case table, derived from one rule about cube faces.
+//! - `mask`: which cells marching cubes draws (rule 2), as bits.
+//! - `vertex`: the one vertex function of cubes and ring (rule 4), with normals and materials.
+//! - `block`: marching cubes over up to 8x8x8 cells of one chunk; `plain` is the same by the textbook.
+//! - `tile`: the heightmap's triangles outside the mask, rings included (rule 3).
+//! - `mesh`: vertex and index buffers, local to a chunk or tile; `indices` has 16 or 32 bits each.
+//! - `lod`: the nodes of a quadtree cut, coarser ones included (rules 7 to 9).
+//! - `seams`: checks that everything drawn together is closed.
 
 #[doc(hidden)]
 pub mod block;

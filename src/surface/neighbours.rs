@@ -45,7 +45,7 @@ impl<'a> Neighbours<'a> {
     }
 }
 
-/// Of nine stacks, those that hold corners of the middle one's cells: itself, beyond x, beyond z, beyond both.
+/// Which of nine stacks hold corners of the middle one's cells: itself, beyond x, beyond z, beyond both.
 const CORNER_STACKS: [usize; 4] = [4, 5, 7, 8];
 
 /// The bricks that hold corners of a brick's cells, at its own height and at the next: the own one, those beyond x,

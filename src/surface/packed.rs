@@ -11,12 +11,12 @@ pub(crate) struct PackedVertices<'a> {
     pub origin: IVec3,
     /// Position in 1/4096 voxel; the fourth number is unused.
     pub positions: &'a [[u16; 4]],
-    /// As many.
+    /// Normals, one per position.
     pub normals: &'a [[f32; 3]],
     pub mixes: PackedMixes<'a>,
 }
 
-/// What packed vertices are made of.
+/// The materials of packed vertices.
 #[derive(Clone, Copy)]
 pub(crate) enum PackedMixes<'a> {
     /// One mix for all.
@@ -26,7 +26,7 @@ pub(crate) enum PackedMixes<'a> {
 }
 
 impl<'a> PackedVertices<'a> {
-    /// Their number.
+    /// The number of vertices.
     pub fn len(self) -> usize {
         self.positions.len()
     }

@@ -82,7 +82,7 @@ impl PristineStack {
         layers
     }
 
-    /// Of the eight layers of cells from `y` on, those that the surface crosses somewhere.
+    /// Which of the eight layers of cells from `y` on the surface crosses somewhere.
     pub fn crossed(&self, y: i32) -> Range<usize> {
         let [all, some] = self.filled(y);
         all.saturating_sub(1)..some.min(8)

@@ -51,7 +51,7 @@ pub struct SeamReport {
     pub euler: i64,
     /// Largest angle between the normals of vertices at one place, degrees.
     pub worst_normal_jump: f64,
-    /// Where that is, in voxels.
+    /// Where the largest angle is, in voxels.
     pub worst_normal_at: Option<DVec3>,
     /// A place, in voxels, for each kind of fault that was found.
     pub first: BTreeMap<SeamFault, DVec3>,
@@ -297,7 +297,7 @@ mod tests {
         // Vertices that no triangle has count nothing.
         assert_eq!([found.triangles, found.vertices, found.edges], [4, 4, 6]);
         assert_eq!((found.euler, found.worst_normal_at), (2, None));
-        assert!(!report(&[]).is_closed(), "nothing is no surface");
+        assert!(!report(&[]).is_closed(), "an empty list is not a surface");
     }
 
     #[test]

@@ -103,11 +103,11 @@ const ROOM: usize = 64;
 /// The rings of 8x8 cells of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Patch {
-    /// Where, as (z, x).
+    /// Where the patch is, as (z, x).
     at: (i32, i32),
-    /// Where its vertices end.
+    /// Where the patch's vertices end.
     vertices: usize,
-    /// Where its triangles end.
+    /// Where the patch's triangles end.
     fans: usize,
 }
 
@@ -167,7 +167,7 @@ impl Rings {
         &self.vertices
     }
 
-    /// Their triangles: the tile's columns count first, then these rings' own vertices.
+    /// The triangles of the rings: the tile's columns count first, then these rings' own vertices.
     pub(crate) fn fans(&self) -> &[u32] {
         &self.fans
     }
@@ -203,9 +203,9 @@ struct Drawing<'a> {
 /// The vertices of a cell's side, which two cells of a patch share: numbered one after the other, up or down.
 #[derive(Clone, Copy, Default)]
 struct Side {
-    /// The number of the first one.
+    /// The number of the side's first vertex.
     number: u32,
-    /// And the level that it lies on.
+    /// The y of the level that the side lies on.
     y: i32,
 }
 

@@ -24,14 +24,14 @@ pub struct Commit {
     pub(super) uniform: Option<UniformBricks>,
     pub(super) next_field: u64,
     pub(super) receipts: Vec<Receipt>,
-    /// Its record, where a log is kept.
+    /// The record for the log, where one is kept.
     pub(super) record: Option<RecordDraft>,
     pub(super) news: Vec<(ChunkPos, FieldChange)>,
     /// The surfaces that the world keeps: the meshes may be taken away before.
     pub(super) kept: NewSurfaces,
     /// The cut that is drawn afterwards, if it changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
-    /// Returns `true` if it changes only what is drawn.
+    /// Whether it only changes which nodes are drawn.
     pub(super) is_cut: bool,
     /// The new world, if all of it is replaced.
     pub(super) whole: Option<Arc<World>>,
@@ -39,7 +39,7 @@ pub struct Commit {
     pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
     pub meshes: MeshUpdates,
-    /// Durations of its stages.
+    /// Durations of the stages.
     pub stages: Stages,
 }
 

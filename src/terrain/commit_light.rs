@@ -9,8 +9,8 @@ use crate::world::sky::{LitWorld, SkyColumns, SkyLights};
 use crate::world::{MeshKey, World};
 
 impl Commit {
-    /// Computes the light of all surfaces that a commit to this world makes or lights otherwise, and returns the number of
-    /// their vertices: for benchmarks.
+    /// Computes the light of all surfaces that a commit to this world makes or lights otherwise, and returns the number
+    /// of their vertices: for benchmarks.
     #[doc(hidden)]
     pub fn light(&self, before: Arc<World>) -> usize {
         let lit = LitWorld::new(before, self.change().bricks);

@@ -78,7 +78,7 @@ impl fmt::Debug for Terrain {
 pub(super) struct InFlight {
     pub ticket: u64,
     pub work: Work,
-    /// Its work, in the units of the queue.
+    /// The transaction's work, in the units of the queue.
     estimate: u64,
     /// Whether the plugin runs it.
     #[cfg_attr(not(feature = "plugin"), expect(dead_code))]

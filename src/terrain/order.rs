@@ -23,7 +23,7 @@ pub enum Order {
     /// Undoes the last group of edits that changed the world. Groups are decided when edits are submitted, not when
     /// their transactions begin: brushes of one [stroke](crate::brush::Brush::stroke) that follow each other, those
     /// that one call of [`apply`](super::Terrain::apply) or [`submit_all`](super::Terrain::submit_all) was given, or
-    /// a single brush. One that changed nothing is no step.
+    /// a single brush. A group that changed nothing is not a step.
     ///
     /// Afterwards everything equals the state before that group, bit by bit: [`World::hash`](super::World::hash),
     /// samples, materials, fields with their names, boxes and revisions, mask, meshes and rings. The exceptions are
@@ -60,7 +60,7 @@ impl Order {
         Self::Parts { change: change.into(), hash }
     }
 
-    /// Its kind, as its receipt names it.
+    /// The order's kind, as its receipt names it.
     pub fn asked(&self) -> Asked {
         match self {
             Self::Edit(_) => Asked::Edit,
@@ -83,7 +83,7 @@ impl Order {
         self.edit().is_none_or(|edit| edit.kind().is_alone())
     }
 
-    /// Its work, in bricks.
+    /// The order's work, in bricks.
     pub(super) fn work(&self, grid: ChunkGrid) -> u64 {
         let Some(edit) = self.edit() else { return STEP };
         edit_work(grid, edit).unwrap_or(EDIT_WORK)
@@ -128,7 +128,7 @@ impl Request {
         Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit).map_err(Rejection::from) }
     }
 
-    /// Its work, in bricks.
+    /// The request's work, in bricks.
     pub(super) fn work(&self, grid: ChunkGrid) -> u64 {
         self.order.as_ref().map_or(EDIT_WORK, |order| order.work(grid))
     }

@@ -52,7 +52,7 @@ fn script(rng: &mut Rng, ground: &Ground) -> Vec<Ask> {
             }
             if rng.u32(0..20) == 0 {
                 brush.blend.strength = f32::NAN;
-                // The shape is refused first: what is no number equals nothing, also in a receipt.
+                // The shape is refused first: NaN equals nothing, also in a receipt.
                 brush.shape = crate::brush::Shape::sphere(glam::Vec3::ZERO, -1.0);
                 brush.custom = None;
             }

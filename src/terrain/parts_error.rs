@@ -34,7 +34,7 @@ pub enum PartsError {
     GroundSize {
         /// Width and depth of the new one.
         found: (i32, i32),
-        /// Those of the world's.
+        /// Width and depth of the world's ground.
         expected: (i32, i32),
     },
 }

@@ -44,7 +44,7 @@ impl PendingDisplay {
         self.drawn.iter().copied()
     }
 
-    /// Their number.
+    /// The number of tiles and chunks that changed.
     pub fn len(&self) -> usize {
         self.drawn.len()
     }

@@ -44,9 +44,9 @@ impl Default for WorkLimits {
 /// The reason why consecutive edits are one step of undo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Together {
-    /// They belong to one stroke.
+    /// The edits belong to one stroke.
     Stroke(u64),
-    /// They were submitted together, in the batch with this number.
+    /// The edits were submitted together, in the batch with this number.
     Batch(u64),
 }
 

@@ -31,8 +31,8 @@ impl LogEntry {
 /// A commit: the requests and their results.
 #[derive(Clone, Debug)]
 pub struct CommitRecord {
-    /// Its number in the log that it was taken from: one more than that of the record before. A log whose numbers have
-    /// a gap has lost records. A saved record has the number 0.
+    /// The commit's number in the log that it was taken from: one more than that of the record before. A log whose
+    /// numbers have a gap has lost records. A saved record has the number 0.
     pub number: u64,
     /// The [revision](super::World::revision) that it led to: one more than that of the record before, or the same
     /// where only rules or settings changed.
@@ -81,7 +81,7 @@ pub struct WorldParts {
     pub change: Patch,
     /// Cells along the side of the chunks that the fields belong to.
     pub chunk_size: u32,
-    /// Its revision.
+    /// The world's revision.
     pub revision: u64,
     /// The rules and the search for loose pieces that edits obey.
     pub edit_settings: EditSettings,

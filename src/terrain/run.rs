@@ -41,8 +41,8 @@ impl Transaction {
         Self { engine: Some(engine.clone()), ..self }.run()
     }
 
-    /// Computes the commit on another engine than the terrain's own, and returns the world before it too. It must be dropped
-    /// before the commit is installed, otherwise that copies the world.
+    /// Computes the commit on another engine than the terrain's own, and returns the world before it too. It must be
+    /// dropped before the commit is installed, otherwise that copies the world.
     #[cfg(feature = "plugin")]
     pub(crate) fn run_with_world(self, engine: &Engine) -> (Commit, Arc<World>) {
         let own = Self { engine: Some(engine.clone()), ..self };

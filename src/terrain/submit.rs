@@ -55,7 +55,8 @@ impl Terrain {
         }
     }
 
-    /// The work of an order, if there is room for it. Rules and settings of loose pieces are not queued, and are none.
+    /// The work of an order, if there is room for it. Rules and settings of loose pieces are not queued, and cost
+    /// nothing.
     ///
     /// # Errors
     /// When there is no room.
@@ -105,8 +106,8 @@ impl Terrain {
     /// on this thread. Returns their receipts; those of orders that waited are kept for
     /// [`take_receipts`](Self::take_receipts). This is for tools and tests; in a game the plugin does it.
     ///
-    /// Rules and settings of loose pieces have no receipt, unless the rules are invalid: then it comes last, behind those of all
-    /// orders.
+    /// Rules and settings of loose pieces have no receipt, unless the rules are invalid: then it comes last, behind
+    /// those of all orders.
     ///
     /// Edits that follow each other are one step of undo, except for strokes among them; a game that replays a journal
     /// may want to [clear](Self::clear_history) history afterwards. The limits on waiting work do not apply.

@@ -34,7 +34,7 @@ impl fmt::Debug for Transaction {
 }
 
 impl Transaction {
-    /// Its number.
+    /// The transaction's number.
     #[cfg(feature = "plugin")]
     pub(crate) fn ticket(&self) -> u64 {
         self.ticket

@@ -91,7 +91,7 @@ pub(super) enum PieceMessage {
 /// The state of a shared terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Standing {
-    /// It follows the server that has sent this invitation.
+    /// The terrain follows the server that has sent this invitation.
     Follows(u64),
     /// No server has announced that it serves a ground. Edits wait until one does.
     Waits,

@@ -7,7 +7,6 @@
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
-use bevy::window::ExitSystems;
 //! # use bevy_burrow::prelude::*;
 //! use bevy_burrow::net::{Server, ServerSettings};
 //! use bevy_burrow::together::{GroundServer, SharedTerrain, TogetherPlugin};
@@ -48,6 +47,7 @@ pub use server::{GroundServer, GroundServerEvent};
 pub use shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 
 use bevy::prelude::*;
+use bevy::window::ExitSystems;
 
 use crate::plugin::{
     BrushApplied, BurrowSystems, FollowCommits, HistoryMoved, LoosePieceFound, LoosePieceReturned,

@@ -20,7 +20,7 @@ pub(super) struct Players {
     clients: HashMap<net::ClientId, Peer>,
     /// Removed clients: messages from them on the same connection are ignored.
     kicked: HashSet<Entity>,
-    /// Those among them whose player has used another connection since, and which were not notified.
+    /// Removed clients that were not notified, as their player has used another connection since.
     replaced: Vec<Entity>,
     /// Bytes that wait for the server.
     waiting: HashMap<net::ClientId, usize>,

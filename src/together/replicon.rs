@@ -108,7 +108,7 @@ pub(super) struct FromPlayers<'w> {
 }
 
 impl FromPlayers<'_> {
-    /// Those that were not read yet.
+    /// The messages that were not read yet.
     pub fn read<'a>(&'a self, read: &'a mut ReadMessages) -> impl Iterator<Item = (Peer, &'a FromPlayer)> {
         read.read(&self.messages).map(|FromClient { client_id, message }| (*client_id, message))
     }

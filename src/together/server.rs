@@ -41,11 +41,11 @@ pub struct GroundServer {
 
 /// The state of the server.
 enum State {
-    /// Its world is being read.
+    /// The server's world is being read.
     Opening(ThreadTask<Result<(Box<ServerState>, Vec<StoreWarning>), StoreError>>, Progress),
     Idle(Box<ServerState>),
     Running(ThreadTask<Box<ServerState>>),
-    /// Its world could not be read, or it is taken out for a moment.
+    /// The server's world could not be read, or the server is taken out for a moment.
     Unavailable,
 }
 
@@ -66,7 +66,7 @@ type Request = Box<dyn FnOnce(&mut ServerState, Duration) + Send + Sync>;
 /// An event of the ground's server.
 #[derive(Message, Clone, Debug)]
 pub enum GroundServerEvent {
-    /// Its world was read; or it can't be read, and nothing is served.
+    /// The server's world was read; or it can't be read, and nothing is served.
     Opened(Result<(), Arc<StoreError>>),
     /// An event about its players.
     Players(ServerEvent),

@@ -24,8 +24,8 @@ use crate::terrain::Receipt;
 #[derive(Component, Default)]
 #[component(on_add = warn_without_plugin)]
 pub struct SharedTerrain {
-    /// Images, grids and prefabs that the player's edits may hold. The server needs them too; players that lack one get it from
-    /// there.
+    /// Images, grids and prefabs that the player's edits may hold. The server needs them too; players that lack one get
+    /// it from there.
     pub contents: ContentTable,
     /// The player's position, in voxels of the terrain: missing ground is fetched from there outwards.
     pub position: IVec3,
@@ -82,14 +82,14 @@ fn warn_without_plugin(world: bevy::ecs::world::DeferredWorld, _: bevy::ecs::lif
 /// The outcome of an edit.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EditOutcome {
-    /// It is shown, with the result that the player's machine predicts.
+    /// The edit is shown, with the result that the player's machine predicts.
     Predicted(Receipt),
-    /// The server has ordered it, with this result for all players. `None` if the player was disconnected at that
+    /// The server has ordered the edit, with this result for all players. `None` if the player was disconnected at that
     /// moment, so that the result is not known; the [`BrushApplied`](crate::plugin::BrushApplied) then has an empty
     /// outcome.
     Confirmed(Option<Receipt>),
-    /// It was refused, and is no longer shown. `None` if it could not be sent, or the player was disconnected when it
-    /// was refused.
+    /// The edit was refused, and is no longer shown. `None` if it could not be sent, or the player was disconnected
+    /// when it was refused.
     Refused(Option<Refusal>),
 }
 

@@ -7,17 +7,18 @@ use bevy::prelude::*;
 use super::vertex::VertexPlugin;
 use crate::plugin::propagate_material;
 
-/// Propagates the `MeshMaterial3d<M>` of a terrain's entity to its tiles, chunks and [pieces](crate::plugin::GroundPiece), also
-/// when it changes or is removed. A piece that is spawned with its own keeps it until the terrain's changes.
+/// Propagates the `MeshMaterial3d<M>` of a terrain's entity to its tiles, chunks and
+/// [pieces](crate::plugin::GroundPiece), also when it changes or is removed. A piece that is spawned with its own keeps
+/// it until the terrain's changes.
 ///
-/// A terrain is drawn with one material: the one of a [`GroundLook`](super::GroundLook) before any other, or else the one whose
-/// plugin was added last. A warning names the others.
+/// A terrain is drawn with one material: the one of a [`GroundLook`](super::GroundLook) before any other, or else the
+/// one whose plugin was added last. A warning names the others.
 ///
 /// `BurrowPlugins` contain it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
 /// plugins. Vertex colours carry the terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
 /// [`ATTRIBUTE_MATERIAL_IDS`](crate::plugin::ATTRIBUTE_MATERIAL_IDS) and
-/// [`ATTRIBUTE_MATERIAL_WEIGHTS`](crate::plugin::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders. A material with a vertex
-/// shader of its own also needs [`prepass_vertex_shader`](super::prepass_vertex_shader).
+/// [`ATTRIBUTE_MATERIAL_WEIGHTS`](crate::plugin::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders. A material with a
+/// vertex shader of its own also needs [`prepass_vertex_shader`](super::prepass_vertex_shader).
 pub struct TerrainMaterialPlugin<M: Material>(PhantomData<fn() -> M>);
 
 impl<M: Material> Default for TerrainMaterialPlugin<M> {

@@ -1,7 +1,7 @@
 //! How the ground looks: materials on tiles, chunks and pieces.
 //!
-//! A [`GroundLook`] on the terrain draws layers of texture, chosen by what the ground is made of, how steep it is, and how
-//! deep below the pristine surface. [`GroundTextures`] are painted at the start, or are a game's own.
+//! A [`GroundLook`] on the terrain draws layers of texture, chosen by what the ground is made of, how steep it is, and
+//! how deep below the pristine surface. [`GroundTextures`] are painted at the start, or are a game's own.
 //!
 //! ```no_run
 //! # use bevy::prelude::*;
@@ -18,8 +18,8 @@
 //! }
 //! ```
 //!
-//! Add Bevy's renderer first: `add_plugins((DefaultPlugins, BurrowPlugins))`. In the other order no [`GroundLook`] is drawn,
-//! and an error is logged; other materials work in any order.
+//! Add Bevy's renderer first: `add_plugins((DefaultPlugins, BurrowPlugins))`. In the other order no [`GroundLook`] is
+//! drawn, and an error is logged; other materials work in any order.
 //!
 //! To use a material of your own, put it on the terrain instead, and add a [`TerrainMaterialPlugin`] for its type:
 //!

@@ -31,14 +31,14 @@ use bevy::shader::{ShaderRef, load_shader_library};
 /// }
 /// ```
 ///
-/// The two passes must also leave out the same triangles: set `descriptor.primitive.cull_mode` in [`Material::specialize`],
-/// as Bevy's prepass otherwise draws backs of triangles, which the main pass leaves out.
+/// The two passes must also leave out the same triangles: set `descriptor.primitive.cull_mode` in
+/// [`Material::specialize`], as Bevy's prepass otherwise draws backs of triangles, which the main pass leaves out.
 ///
 /// Materials without a vertex shader of their own need nothing: there Bevy's shaders draw both passes.
 ///
 /// The shaders are there wherever [`GroundPlugin`](super::GroundPlugin) or any
-/// [`TerrainMaterialPlugin`](super::TerrainMaterialPlugin) is. They ignore skins and morph targets, which terrains do not
-/// have, and draw shadows too.
+/// [`TerrainMaterialPlugin`](super::TerrainMaterialPlugin) is. They ignore skins and morph targets, which terrains do
+/// not have, and draw shadows too.
 pub fn prepass_vertex_shader() -> ShaderRef {
     "embedded://bevy_burrow/view/prepass.wgsl".into()
 }

@@ -13,8 +13,8 @@ use crate::lattice::{BRICK, BrickPos, Column, LatticeBox, ceil, hash};
 /// Samples in a brick.
 const LEN: usize = (BRICK * BRICK * BRICK) as usize;
 
-/// The density stored at a lattice point: 1/256 voxel, negative is solid. A pristine sample is no number at all, it has
-/// to be computed from the ground (rule 1).
+/// The density stored at a lattice point: 1/256 voxel, negative is solid. A pristine sample has no
+/// stored density: it is computed from the ground (rule 1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Sample(i16);
 

@@ -9,7 +9,7 @@ pub struct FieldId(pub u64);
 /// A region of edits inside one chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Its name.
+    /// The field's name.
     pub id: FieldId,
     /// Box around its edited samples.
     pub bounds: LatticeBox,
@@ -65,7 +65,7 @@ impl Fields {
         self.0.iter()
     }
 
-    /// Their number.
+    /// The number of fields.
     pub fn len(&self) -> usize {
         self.0.len()
     }

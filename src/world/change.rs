@@ -31,9 +31,9 @@ impl Change {
         std::mem::swap(&mut self.sample_hash, &mut world.sample_hash);
     }
 
-    /// Adds what a later change replaced first, so that swapping restores the state before both, and returns what is not added;
-    /// `reached` has the positions of this one. Takes as long as the later change is large. The lists are [sorted](Self::sort)
-    /// no more.
+    /// Adds what a later change replaced first, so that swapping restores the state before both, and returns what is
+    /// not added; `reached` has the positions of this one. Takes as long as the later change is large. The lists are
+    /// [sorted](Self::sort) no more.
     pub fn absorb(&mut self, reached: &mut Reached, later: Self) -> Patch {
         add_new(&mut self.mask, &mut reached.words, later.mask);
         let Patch { bricks, fields, next_field } = later.patch;
@@ -78,7 +78,7 @@ pub(crate) struct Reached {
 }
 
 impl Reached {
-    /// Those of a change.
+    /// The positions of a change.
     pub fn of(change: &Change) -> Self {
         Self {
             bricks: change.patch.bricks.iter().map(|own| (own.0, ())).collect(),

@@ -8,11 +8,12 @@ use rustc_hash::FxHashMap;
 use crate::lattice::{ChunkGrid, shrink_if_sparse, table_bytes};
 use crate::lod::{LodGrid, Node};
 
-/// The nodes of all levels that contain edits. A commit changes only the nodes over stacks that get their first brick or lose
-/// their last one, so it costs the same however large the world is.
+/// The nodes of all levels that contain edits. A commit changes only the nodes over stacks that get their first brick
+/// or lose their last one, so it costs the same however large the world is.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EditedNodes {
-    /// At level 0 how many stacks of bricks hold samples of the node, and at coarser levels how many of its children are here.
+    /// At level 0 how many stacks of bricks hold samples of the node, and at coarser levels how many of its children
+    /// are here.
     counts: FxHashMap<Node, u32>,
     /// Differs from that of any other set of nodes in this process.
     version: u64,

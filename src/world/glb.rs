@@ -23,7 +23,7 @@ pub enum GlbError {
         /// Bytes of its buffer.
         bytes: u64,
     },
-    /// The voxel size is not a positive number, or so large that positions in metres are no finite numbers.
+    /// The voxel size is not a positive number, or so large that positions in metres are not finite.
     #[error("the voxel size is {0}, but it must be a positive number with which all positions are finite")]
     VoxelSize(f32),
     /// A vertex has no finite position or normal, so that other programs would refuse the file.
@@ -192,8 +192,8 @@ impl World {
     /// one mesh each, whole where they reach beyond the box. Every triangle that is drawn is there, and no other.
     ///
     /// Positions are in metres, for voxels of this size, y up. Vertices have their normals, the colours that `colours`
-    /// gives (linear red, green and blue, 0 to 1), mixed by weight, and the attributes `_MATERIALS` and `_WEIGHTS` with up
-    /// to four materials and their weights.
+    /// gives (linear red, green and blue, 0 to 1), mixed by weight, and the attributes `_MATERIALS` and `_WEIGHTS` with
+    /// up to four materials and their weights.
     ///
     /// # Errors
     /// [`GlbError`]

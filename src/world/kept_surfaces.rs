@@ -11,13 +11,14 @@ use crate::surface::ChunkSurface;
 /// The most bytes of surfaces: some 1,500 chunks of 32 voxels that are dug all over.
 const MAX_BYTES: usize = 64 << 20;
 
-/// The surfaces of the chunks that changed last, none of them empty. A dig copies the unchanged parts of a kept surface; that of
-/// any other chunk is made again as a whole, which takes about as long as the dig itself in chunks of 32.
+/// The surfaces of the chunks that changed last, none of them empty. A dig copies the unchanged parts of a kept
+/// surface; that of any other chunk is made again as a whole, which takes about as long as the dig itself in chunks
+/// of 32.
 #[derive(Clone)]
 pub(crate) struct KeptSurfaces {
     surfaces: FxHashMap<ChunkPos, Kept>,
-    /// The chunks by the time of their last change, the first one longest ago; a chunk that changed again since, or whose
-    /// surface is gone, has another time in the table or none.
+    /// The chunks by the time of their last change, the first one longest ago; a chunk that changed again since, or
+    /// whose surface is gone, has another time in the table or none.
     by_time: VecDeque<(u64, ChunkPos)>,
     time: u64,
     /// Bytes of all surfaces.
@@ -69,8 +70,8 @@ impl KeptSurfaces {
         self.bytes -= self.surfaces.remove(&chunk).map_or(0, |old| bytes(&old.surface));
     }
 
-    /// Drops surfaces that changed longest ago until the rest is within the limit, but never the one that changed last; returns
-    /// their chunks.
+    /// Drops surfaces that changed longest ago until the rest is within the limit, but never the one that changed last;
+    /// returns their chunks.
     pub fn trim(&mut self) -> Vec<ChunkPos> {
         let mut dropped = Vec::new();
         while self.bytes > self.max_bytes && self.surfaces.len() > 1 {

@@ -13,9 +13,9 @@ pub struct Memory {
     pub samples: usize,
     /// Materials of bricks.
     pub materials: usize,
-    /// Meshes of the chunks that changed last, from whose unchanged parts the next ones are copied: at most 64 MiB, or one
-    /// chunk. Besides, room for the next
-    /// transaction is kept, which belongs to no world: some 3 MiB for each thread that meshes, up to 8 of them.
+    /// Meshes of the chunks that changed last, from whose unchanged parts the next ones are copied: at most 64 MiB, or
+    /// one chunk. Besides, room for the next transaction is kept, which belongs to no world: some 3 MiB for each thread
+    /// that meshes, up to 8 of them.
     pub meshes: usize,
     /// Where parts are in meshes, and rings of tiles.
     pub parts: usize,

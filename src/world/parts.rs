@@ -23,8 +23,8 @@ fn edited_part(pos: BrickPos, brick: &Brick, samples: LatticeBox) -> Option<Edit
 }
 
 /// The fields of a chunk, made to hold its edited samples and nothing else: each shrinks to what is edited in it, or
-/// disappears, and grows over edited samples that none contains. `parts` are all that was edited in the chunk; `next` names
-/// new fields.
+/// disappears, and grows over edited samples that none contains. `parts` are all that was edited in the chunk; `next`
+/// names new fields.
 fn fitted(fields: &Fields, parts: &[EditedPart], next: &mut u64) -> Fields {
     let shrunk = |field: &Field| {
         let near = parts.iter().filter(|(.., own)| own.intersection(field.bounds).is_some());
@@ -46,8 +46,8 @@ fn fitted(fields: &Fields, parts: &[EditedPart], next: &mut u64) -> Fields {
 }
 
 impl Patch {
-    /// Makes the fields of a whole world, all of whose bricks this patch holds, hold the edited samples and nothing else.
-    /// New fields get unused names. Returns whether anything changed.
+    /// Makes the fields of a whole world, all of whose bricks this patch holds, hold the edited samples and nothing
+    /// else. New fields get unused names. Returns whether anything changed.
     pub(crate) fn fit_fields(&mut self, grid: ChunkGrid) -> bool {
         let mut chunks: BTreeMap<ChunkPos, Vec<EditedPart>> =
             self.fields.iter().map(|(chunk, _)| (*chunk, Vec::new())).collect();
@@ -69,8 +69,8 @@ impl Patch {
         has_changed
     }
 
-    /// Adds the fields that some chunks of a world have once this patch has replaced its bricks, where they differ from the
-    /// present ones.
+    /// Adds the fields that some chunks of a world have once this patch has replaced its bricks, where they differ from
+    /// the present ones.
     #[cfg(feature = "net")]
     pub(crate) fn add_fitted_fields(&mut self, world: &World, chunks: impl IntoIterator<Item = ChunkPos>) {
         let (mut next, mut fields) = (self.next_field, Vec::new());

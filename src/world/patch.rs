@@ -144,7 +144,8 @@ impl Patch {
         regions
     }
 
-    /// Swaps these bricks and fields with those of a world; a second swap restores it. Names of fields are never reused.
+    /// Swaps these bricks and fields with those of a world; a second swap restores it. Names of fields are never
+    /// reused.
     pub(crate) fn swap(&mut self, world: &mut World) {
         for (pos, brick) in &mut self.bricks {
             let (key, y) = (pos.stack(), pos.0.y);
@@ -256,7 +257,7 @@ impl Overlay {
         Over { above: self, below }
     }
 
-    /// Its content as a patch.
+    /// The overlay's content as a patch.
     pub fn patch(&self, next_field: u64) -> Patch {
         let bricks = self.bricks.iter().map(|(pos, brick)| (*pos, brick.clone()));
         let fields = self.fields.iter().map(|(chunk, fields)| (*chunk, fields.clone()));

@@ -36,7 +36,7 @@ pub enum TerrainError {
     /// The chunk size is out of range.
     #[error("chunk size {0} is not in 8..=128")]
     ChunkSize(u32),
-    /// The voxel size is no power of two from 1/8 to 8.
+    /// The voxel size is not a power of two from 1/8 to 8.
     #[error("voxel size {0} is not one of 1/8, 1/4, 1/2, 1, 2, 4, 8")]
     VoxelSize(f32),
 }

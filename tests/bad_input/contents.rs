@@ -156,7 +156,7 @@ fn apply(terrain: &mut Terrain, brush: &Brush) -> bool {
     assert_eq!(*tag, brush.tag);
     match (quantized, outcome) {
         (Err(error), Err(Rejection::Brush(why))) => {
-            // Numbers that are no numbers differ from themselves.
+            // NaN differs from itself.
             assert_eq!(error.to_string(), why.to_string());
             assert!(!error.to_string().is_empty());
         }

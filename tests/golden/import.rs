@@ -9,7 +9,7 @@ use bevy_burrow::prelude::*;
 use crate::landscape::materials;
 use crate::studio::Studio;
 
-/// Of the default layers.
+/// Materials of the default layers.
 const CONCRETE: MaterialId = MaterialId(5);
 const CLAY: MaterialId = MaterialId(4);
 const SOIL: MaterialId = MaterialId(8);

@@ -6,7 +6,7 @@
 //! | approve of new looks | the same with `BURROW_GOLDEN=write`, then look at `tests/golden/pictures` and commit |
 //! | after a failure | `$CARGO_TARGET_DIR/proof/golden` has the picture, the golden one and their difference |
 //!
-//! Pictures are compared by FLIP, an estimate of visible difference: 0 is none, 1 is the largest. The tests need a
+//! Pictures are compared by FLIP, an estimate of visible difference: 0 means none, 1 is the largest. The tests need a
 //! Vulkan driver; lavapipe is enough. Without one, the tests print a notice and pass; with `BURROW_REQUIRE=1` they
 //! fail.
 //!

@@ -106,10 +106,10 @@ pub fn flat(studio: &mut Studio) -> GroundTextures {
 struct Counts {
     /// Pixels that show ground.
     seen: usize,
-    /// Those that show one material, and those that show two on a border.
+    /// Pixels that show one material, and pixels that show two on a border.
     pure: usize,
     mixed: usize,
-    /// Those that show what is not there.
+    /// Pixels that show what is not there.
     wrong: usize,
     /// A bit for each material that shows.
     materials: u32,

@@ -5,7 +5,7 @@
 #[path = "../worlds/mod.rs"]
 mod worlds;
 
-mod drawn;
+mod check;
 mod random;
 mod ridges;
 mod same;

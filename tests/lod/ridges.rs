@@ -5,7 +5,7 @@ use bevy_burrow::lod::Cut;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 
-use crate::drawn::draw;
+use crate::check::draw;
 
 /// How far the middles of two lines lie from the ground, in 1/256 voxel: of the one along which a cell is split, and of
 /// the other one. Of all coarse cells with sides of one length each that have no finer neighbours.

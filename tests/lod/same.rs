@@ -7,7 +7,7 @@ use bevy_burrow::surface::{SurfaceMesh, Vertex};
 use fastrand::Rng;
 use glam::IVec3;
 
-use crate::drawn::draw;
+use crate::check::draw;
 use crate::random::{for_worlds, split_once};
 use crate::worlds::world_count;
 

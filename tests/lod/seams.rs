@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use crate::drawn::{Counts, check, draw};
+use crate::check::{Counts, check, draw};
 use crate::random::{for_worlds, random_brushes, random_world, split_once};
 use crate::worlds::world_count;
 use bevy_burrow::ground::Strata;

@@ -7,7 +7,7 @@ use bevy_burrow::prelude::*;
 use bevy_burrow::surface::Vertex;
 use bevy_burrow::terrain::World;
 
-use crate::drawn::{check, draw};
+use crate::check::{check, draw};
 
 /// Level ground with a material for each column.
 fn ground(side: i32, material: impl Fn(Column) -> u8) -> Ground {

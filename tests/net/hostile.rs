@@ -19,7 +19,7 @@ use crate::follower::{FRAME, Follower, count, hills, play, terrain};
 use crate::worlds::{any_random_brush, contents as random_contents};
 
 /// Bytes that a decoder may take regardless of the size of its input.
-const ANYWAY: u64 = 1 << 20;
+const BASE_BYTES: u64 = 1 << 20;
 /// Bytes that a message to the server may take for each of its bytes: an edit is some 200 bytes, and at least 4 in a
 /// message.
 const TO_SERVER: u64 = 400;
@@ -225,7 +225,7 @@ fn decoders_take_any_bytes() {
         let bytes = hostile(&mut rng, &to_server);
         let mut message = None;
         let memory = measure(|| message = ToServer::from_bytes(&bytes, &contents).ok()).bytes_max;
-        assert!(memory < ANYWAY + TO_SERVER * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
+        assert!(memory < BASE_BYTES + TO_SERVER * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
         most[0] = memory.max(most[0]);
         if let Some(message) = message {
             accepted[0] += 1;
@@ -237,7 +237,7 @@ fn decoders_take_any_bytes() {
         let bytes = hostile(&mut rng, &to_client);
         let mut message = None;
         let memory = measure(|| message = ToClient::from_bytes(&bytes, &ground, &contents).ok()).bytes_max;
-        assert!(memory < ANYWAY + TO_CLIENT * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
+        assert!(memory < BASE_BYTES + TO_CLIENT * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
         most[1] = memory.max(most[1]);
         if let Some(message) = message {
             accepted[1] += 1;
@@ -313,7 +313,7 @@ fn a_server_takes_any_messages() {
         }
         let client = *client;
         let memory = measure(|| server.receive(client, &bytes, now)).bytes_max;
-        assert!(memory < ANYWAY + TO_SERVER * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
+        assert!(memory < BASE_BYTES + TO_SERVER * bytes.len() as u64, "{memory} bytes for {}", bytes.len());
         most = memory.max(most);
         if run % 64 == 63 {
             now += Duration::from_millis(32);
@@ -413,7 +413,7 @@ fn a_flooder_is_kicked_and_nobody_else_notices() {
 }
 
 #[test]
-fn invalid_messages_are_kicked_for_by_their_number() {
+fn too_many_invalid_messages_lead_to_a_kick() {
     let ground = hills(64);
     let settings = ServerSettings { malformed: Rate { per_second: 1, burst: 5 }, ..Default::default() };
     let mut server = Server::new(terrain(&ground), settings);

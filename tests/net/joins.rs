@@ -25,7 +25,7 @@ const USUAL: Line = Line {
     rate: 1_250_000,
 };
 
-/// The same, worse.
+/// A line with more latency and more loss.
 const FAR: Line = Line {
     latency: Duration::from_millis(120),
     jitter: Duration::from_millis(40),

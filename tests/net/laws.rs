@@ -1,4 +1,4 @@
-//! All clients have the same world: while they dig over bad lines, after joining late or reconnecting, after a restart
+//! All clients have the same world: while they dig over lossy connections, after joining late or reconnecting, after a restart
 //! of the server, and after tampered messages are detected.
 
 use std::collections::BTreeSet;
@@ -61,7 +61,7 @@ fn all_have_the_same_world_at_every_number() {
 }
 
 /// Calls a function for the entries that are sent to the first player, until it has changed some; it may drop them.
-fn lie(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Lie + 'static) {
+fn tamper(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Tampered + 'static) {
     let (ground, stamps) = (Arc::clone(&play.ground), Arc::clone(&play.image));
     let mut known = bevy_burrow::net::ContentTable::default();
     known.add(stamps);
@@ -72,10 +72,10 @@ fn lie(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Lie + 'static
         }
         match ToClient::from_bytes(&bytes, &ground, &known) {
             Ok(ToClient::Entries(Entries { first, mut entries })) => {
-                let lie = change(&mut entries);
-                is_done = !matches!(lie, Lie::Not);
+                let tampered = change(&mut entries);
+                is_done = !matches!(tampered, Tampered::Not);
                 let message = ToClient::Entries(Entries { first, entries });
-                (!matches!(lie, Lie::Dropped)).then(|| message.to_bytes())
+                (!matches!(tampered, Tampered::Dropped)).then(|| message.to_bytes())
             }
             _ => Some(bytes),
         }
@@ -83,9 +83,9 @@ fn lie(play: &mut Play, mut change: impl FnMut(&mut Vec<Entry>) -> Lie + 'static
     play.bots[0].may_differ = true;
 }
 
-enum Lie {
+enum Tampered {
     Not,
-    Told,
+    Changed,
     Dropped,
 }
 
@@ -102,9 +102,9 @@ fn a_lost_message_is_noticed_and_what_it_held_comes_again() {
     let mut play = Play::new(&hills(96), 3, settings());
     play.seconds(3.0);
     let mut after = 10;
-    lie(&mut play, move |_| {
+    tamper(&mut play, move |_| {
         after -= 1;
-        if after == 0 { Lie::Dropped } else { Lie::Not }
+        if after == 0 { Tampered::Dropped } else { Tampered::Not }
     });
     play.seconds(8.0);
     play.settle();
@@ -115,7 +115,7 @@ fn a_lost_message_is_noticed_and_what_it_held_comes_again() {
 }
 
 /// Only the first player has something to repair, and has repaired it once.
-fn check_mended(play: &Play) {
+fn check_repaired(play: &Play) {
     let repairs: Vec<u64> = play.bots.iter().map(|bot| bot.client.figures().repairs).collect();
     assert!(repairs[0] > 0, "nothing was noticed");
     assert_eq!((play.bots[0].event("repaired"), &repairs[1..]), (1, &[0, 0][..]));
@@ -131,58 +131,58 @@ fn quiet_play() -> Play {
 }
 
 /// The server changes parts of the world, and one bot receives different parts.
-fn lie_about_parts(play: &mut Play, mut damage: impl FnMut(&mut Patch) + 'static) {
+fn tamper_with_parts(play: &mut Play, mut damage: impl FnMut(&mut Patch) + 'static) {
     let mut other = terrain(&play.ground);
     other.apply([sphere(40.0, 40.0)]);
     play.server.put(other.parts().change).expect("it fits");
-    lie(play, move |entries| {
+    tamper(play, move |entries| {
         for entry in entries {
             if let Entry::Order { order: Order::Parts { change, .. }, .. } = entry {
                 damage(Arc::make_mut(change));
-                return Lie::Told;
+                return Tampered::Changed;
             }
         }
-        Lie::Not
+        Tampered::Not
     });
 }
 
 #[test]
-fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_mended() {
+fn rules_that_come_one_edit_late_are_noticed_at_the_next_mark_and_repaired() {
     let mut play = quiet_play();
     play.server.set_rules(DiggingRules::default().with_bedrock(60)).expect("valid rules");
     play.server.edit(edit(&sphere(40.0, 40.0))).expect("no stamp");
     play.server.set_rules(DiggingRules::default()).expect("valid rules");
     play.server.edit(edit(&sphere(80.0, 80.0))).expect("no stamp");
-    lie(&mut play, |entries| {
+    tamper(&mut play, |entries| {
         entries.swap(0, 1);
-        Lie::Told
+        Tampered::Changed
     });
     play.settle();
-    check_mended(&play);
+    check_repaired(&play);
 }
 
 #[test]
-fn a_brick_that_is_missing_is_noticed_at_the_next_mark_and_mended() {
+fn a_brick_that_is_missing_is_noticed_at_the_next_mark_and_repaired() {
     let mut play = quiet_play();
-    lie_about_parts(&mut play, |change| {
+    tamper_with_parts(&mut play, |change| {
         let at = change.bricks.iter().position(|(_, brick)| brick.is_some()).expect("a brick");
         change.bricks.remove(at);
     });
     play.settle();
-    check_mended(&play);
+    check_repaired(&play);
 }
 
 #[test]
-fn names_of_fields_that_drift_are_noticed_at_the_next_mark_and_mended() {
+fn names_of_fields_that_drift_are_noticed_at_the_next_mark_and_repaired() {
     let mut play = quiet_play();
     // Later fields have other names than those of the others; samples are equal.
-    lie_about_parts(&mut play, |change| change.next_field = 70);
+    tamper_with_parts(&mut play, |change| change.next_field = 70);
     play.seconds(3.0);
     assert_eq!(play.bots[0].client.figures().repairs, 0, "no field has a name of its own");
     play.server.edit(edit(&sphere(80.0, 80.0))).expect("no stamp");
     play.bots[0].may_differ = false;
     play.settle();
-    check_mended(&play);
+    check_repaired(&play);
 }
 
 fn wait_until(play: &mut Play, at: usize, is_so: impl Fn(&Bot) -> bool) {
@@ -222,7 +222,7 @@ fn dig_before(play: &mut Play, edits: u64) {
 const OTHERS: usize = 4;
 
 /// A client joins after many edits, over a line of 256 KiB a second, while four others dig.
-fn come_late(log_bytes: usize) -> Play {
+fn join_late(log_bytes: usize) -> Play {
     // Without undo, edits that wait go into one transaction.
     let settings = ServerSettings { log_bytes, ..ServerSettings::default() };
     let edits = count("BURROW_EDITS", 600);
@@ -251,8 +251,8 @@ fn come_late(log_bytes: usize) -> Play {
 const MANY: u64 = 20_000;
 
 #[test]
-fn who_comes_late_plays_soon() {
-    let mut play = come_late(8 << 20);
+fn a_late_client_plays_soon() {
+    let mut play = join_late(8 << 20);
     let late = &play.bots[OTHERS];
     assert!(late.client.has_joined(), "all of the log is there");
     assert!(late.client.figures().applied > count("BURROW_EDITS", 600) * 3 / 4, "it got regions");
@@ -262,9 +262,9 @@ fn who_comes_late_plays_soon() {
 }
 
 #[test]
-fn who_comes_late_plays_soon_without_the_whole_log() {
+fn a_late_client_plays_soon_without_the_whole_log() {
     let edits = count("BURROW_EDITS", 600);
-    let mut play = come_late(edits as usize * 10);
+    let mut play = join_late(edits as usize * 10);
     assert!(play.bots[OTHERS].client.figures().applied < edits / 2, "it got the log");
     if edits <= MANY {
         wait_until(&mut play, OTHERS, |bot| bot.client.has_joined());
@@ -301,17 +301,17 @@ fn come_back(settings: ServerSettings, away: f64) -> Play {
 }
 
 #[test]
-fn who_comes_back_gets_the_entries_since() {
+fn a_client_that_reconnects_gets_the_entries_since() {
     come_back(settings(), 3.0);
 }
 
 #[test]
-fn who_comes_back_after_a_long_time_gets_the_regions_that_differ() {
+fn a_client_that_was_away_long_gets_the_regions_that_differ() {
     come_back(ServerSettings { log_bytes: 0, ..settings() }, 6.0);
 }
 
 /// Cuts a player's line while it joins, and restores it.
-fn is_cut_off(log_bytes: usize, rate: u64) {
+fn cut_while_joining(log_bytes: usize, rate: u64) {
     let slow = Rate { per_second: rate, burst: rate / 2 };
     let mut play = Play::new(&hills(160), 2, ServerSettings { bulk: slow, log_bytes, ..settings() });
     play.seconds(2.0);
@@ -332,13 +332,13 @@ fn is_cut_off(log_bytes: usize, rate: u64) {
 }
 
 #[test]
-fn who_is_cut_off_while_regions_come_gets_all_of_them_later() {
-    is_cut_off(0, 32 << 10);
+fn a_client_cut_off_while_regions_come_gets_all_of_them_later() {
+    cut_while_joining(0, 32 << 10);
 }
 
 #[test]
-fn who_is_cut_off_while_the_log_comes_gets_all_of_it_later() {
-    is_cut_off(8 << 20, 4 << 10);
+fn a_client_cut_off_while_the_log_comes_gets_all_of_it_later() {
+    cut_while_joining(8 << 20, 4 << 10);
 }
 
 fn options() -> StoreOptions {

@@ -45,7 +45,7 @@ fn forget_neighbours(stage: &mut Stage) {
         let mut body = stage.app.world_mut().entity_mut(body);
         let collider = body.get::<Collider>().expect("ground has a collider");
         let TypedShape::TriMesh(mesh) = collider.shape().as_typed_shape() else {
-            panic!("ground is no mesh")
+            panic!("the ground is not a mesh")
         };
         let plain = Collider::from(SharedShape::new(mesh.clone()));
         body.insert(plain);

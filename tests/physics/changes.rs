@@ -39,7 +39,7 @@ fn bodies_sleeping_on_ground_that_is_removed_or_moved_are_woken() {
         ("the terrain is despawned", |stage, terrain| {
             stage.app.world_mut().despawn(terrain);
         }),
-        ("it is no terrain any more", |stage, terrain| {
+        ("it is not a terrain any more", |stage, terrain| {
             stage.app.world_mut().entity_mut(terrain).remove::<Terrain>();
         }),
         ("its tiles are despawned", |stage, _| {

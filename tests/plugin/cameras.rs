@@ -168,7 +168,7 @@ fn any_perspective_chooses_the_levels_of_its_angle() {
         assert_eq!(own.nodes(), expected, "{what}");
     }
     let broken = View::new(Projection::custom(Own(Mat4::NAN)));
-    assert_eq!(broken.nodes()[0], 0, "a projection that is none chooses nothing");
+    assert_eq!(broken.nodes()[0], 0, "an invalid projection chooses nothing");
 }
 
 fn orthographic(height: f32) -> Projection {

@@ -93,7 +93,7 @@ fn files_that_are_no_heightmap_fail_with_their_reason() {
         ("cut.png", &grey[..grey.len() / 2], "truncated"),
         ("color.png", &color, "plain grey"),
         ("empty.png", b"", ""),
-        ("words.png", b"this is no image at all, but text", "decoded"),
+        ("words.png", b"this is not an image at all, but text", "decoded"),
         ("heights.raw", &[0; 128], "no header"),
         ("heights.r16", &[0; 128], "no header"),
     ];

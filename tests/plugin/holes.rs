@@ -84,7 +84,7 @@ fn a_single_missing_mesh_swap_is_detected_as_a_hole() {
 
 #[test]
 fn moved_and_scaled_terrains_are_closed_too() {
-    // Moved by whole voxels. With scales that are no powers of two hairline cracks may show, and the plugin warns.
+    // Moved by whole voxels. With scales that are not powers of two hairline cracks may show, and the plugin warns.
     for (place, voxel_size) in [(Vec3::new(-1000.0, 40.0, 3.5), 0.125), (Vec3::new(4096.0, -8.0, 104.0), 8.0)]
     {
         let mut stage = Stage::drawing();

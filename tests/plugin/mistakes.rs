@@ -115,7 +115,7 @@ fn a_terrain_that_is_scaled_itself() {
     });
     assert_logged(&log, &terrains, "was replaced", "voxel_size");
     assert_eq!(stage.app.world().get::<Transform>(terrains[0]).expect("a place").scale, Vec3::ONE);
-    // A terrain of another voxel size in its place is no mistake.
+    // A terrain of another voxel size in its place is not a mistake.
     let (_, log) = logged(Stage::drawing(), |stage| {
         let terrain = stage.show(level(2.0));
         stage.app.world_mut().entity_mut(terrain).insert(level(0.5));

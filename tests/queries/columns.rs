@@ -4,7 +4,7 @@ use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::DVec3;
 
-use crate::asked::{dug_landscape, dug_worlds, point_near_surface, random_column};
+use crate::inputs::{dug_landscape, dug_worlds, point_near_surface, random_column};
 use crate::triangles::{NUDGE, TOLERANCE, Triangles};
 
 /// The crossings that spans consist of, lowest first: height, and whether it is a floor.

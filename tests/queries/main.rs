@@ -4,8 +4,8 @@
 //! through an edge or a vertex, rounding decides which triangle is hit. Any answer is accepted then that a ray moved
 //! by a millionth of a voxel could give.
 
-mod asked;
 mod columns;
+mod inputs;
 mod numbers;
 mod rays;
 mod ready;

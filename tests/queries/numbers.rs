@@ -3,7 +3,7 @@
 use fastrand::Rng;
 use glam::DVec3;
 
-use crate::asked::small_terrain;
+use crate::inputs::small_terrain;
 
 #[test]
 fn queries_with_non_finite_numbers_have_no_answer() {

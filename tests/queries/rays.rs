@@ -6,7 +6,7 @@ use bevy_burrow::terrain::{RayHit, World};
 use fastrand::Rng;
 use glam::{DVec3, IVec3, Vec3};
 
-use crate::asked::{dug_landscape, dug_worlds, point_near_surface, random_direction, small_terrain};
+use crate::inputs::{dug_landscape, dug_worlds, point_near_surface, random_direction, small_terrain};
 use crate::triangles::{NUDGE, TOLERANCE, Triangles, distance_to, meet};
 
 /// Two directions perpendicular to a ray.

@@ -4,7 +4,7 @@ use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
 use glam::{IVec3, Vec3};
 
-use crate::asked::small_terrain;
+use crate::inputs::small_terrain;
 
 #[test]
 fn a_place_is_ready_unless_an_edit_is_pending_there() {

@@ -266,7 +266,7 @@ fn grids_with_materials_are_written_and_read_and_wrong_ones_refused() {
     assert_eq!(serde_json::from_str::<Edit>(&json).expect("an edit"), edit);
     let line = serde_json::to_string(&brush).expect("a brush");
     assert_eq!(serde_json::from_str::<Brush>(&line).expect("a brush"), brush);
-    // A row more or less is no grid.
+    // With a row more or less it is not a valid grid.
     let image = edit.stamp_image().expect("the grid's image").clone();
     for rows in [image.height() - 1, image.height() + 1] {
         let mut samples = image.samples().to_vec();

@@ -353,7 +353,7 @@ impl Story {
             ];
             seen.push((past.point, differs, opened.warnings));
         }
-        panic!("{story}: {first:?} is durable, but the saved world is none of the later ones: {seen:?}");
+        panic!("{story}: {first:?} is durable, but the saved world is not one of the later ones: {seen:?}");
     }
 }
 

@@ -68,8 +68,8 @@ fn play_goes_on_while_saving_fails_and_nothing_is_lost() {
             let warnings = player.store().take_warnings();
             if let Err(why) = &refused {
                 assert!(matches!(why, StoreError::NotSaved(_)) && why.to_string().contains(message), "{why}");
-                let is_told = |own: &StoreWarning| matches!(own, StoreWarning::NotSaved(_));
-                assert!(warnings.iter().any(is_told), "{fault:?} from {begin}: {warnings:?}");
+                let is_reported = |own: &StoreWarning| matches!(own, StoreWarning::NotSaved(_));
+                assert!(warnings.iter().any(is_reported), "{fault:?} from {begin}: {warnings:?}");
                 assert!(warnings.len() < 6, "{warnings:?}");
             }
             // Even if the power is lost now, acknowledged commits are there.

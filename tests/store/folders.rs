@@ -78,7 +78,7 @@ fn stray_files_are_left_alone() {
         fs::write(&path, b"").expect("a new file");
         for _ in 0..3 {
             assert_eq!(
-                opened(&place.0, &ground).expect("it is none of its files"),
+                opened(&place.0, &ground).expect("it is not one of its files"),
                 (expected.clone(), vec![]),
                 "{stray}"
             );

@@ -114,7 +114,7 @@ fn a_value_that_is_put_again_and_again_is_logged_once_in_each_frame_and_only_if_
     };
     assert!(logged(1, true) > 64 << 10);
     assert!(logged(60, true) < 2 * (64 << 10), "only the last one in a frame counts");
-    assert!(logged(60, false) < 2 * (64 << 10), "an equal value is no change");
+    assert!(logged(60, false) < 2 * (64 << 10), "an equal value is not a change");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! A game ships a new version of a level: saves that were begun on the old one continue, and keep their edits.
+//! A game ships a new version of a level: saves that were created from the old one continue, and keep their edits.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};

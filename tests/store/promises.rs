@@ -53,6 +53,8 @@ fn each_promise_names_tests_that_there_are() {
         let tests = row.trim_end_matches('|').rsplit('|').next().expect("a last cell");
         let named: Vec<&str> = tests.split('`').skip(1).step_by(2).collect();
         assert!(!named.is_empty() || tests.contains("the same"), "{row}");
-        named.iter().for_each(|test| assert!(sources.contains(&format!("fn {test}(")), "{test} is no test"));
+        named
+            .iter()
+            .for_each(|test| assert!(sources.contains(&format!("fn {test}(")), "{test} is not a test"));
     }
 }

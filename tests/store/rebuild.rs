@@ -82,7 +82,7 @@ fn played(before: Before, is_whole: bool) -> Played {
 enum Doing {
     Playing,
     Compacting,
-    /// It is opened over another ground; only then do the old states no longer apply.
+    /// The world is opened over another ground; only then do the old states no longer apply.
     Replacing,
 }
 

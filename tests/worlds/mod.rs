@@ -52,7 +52,7 @@ pub fn steep_real_ground(width: u32, depth: u32, x: i32, z: i32, relief: f64) ->
 /// every fifth one has strata.
 pub fn random_ground(rng: &mut Rng, index: u64) -> (Ground, u32) {
     let chunk_size = CHUNK_SIZES[(index % 4) as usize];
-    // Sizes that are no multiples of the chunk size: the last chunks are cut at the rim.
+    // Sizes that are not multiples of the chunk size: the last chunks are cut at the rim.
     let side = |rng: &mut Rng| match chunk_size {
         8 => rng.u32(12..=26),
         25 | 32 => rng.u32(chunk_size..=chunk_size + 36),
@@ -465,7 +465,7 @@ fn in_grid(rng: &mut Rng, ground: &Ground, brush: Brush) -> Brush {
     with_shape(brush, CustomShape::Grid(random_grid(rng, at)))
 }
 
-/// A random brush whose shape is no grid and whose edges are not rounded.
+/// A random brush whose shape is not a grid and whose edges are not rounded.
 fn random_simple_brush(rng: &mut Rng, ground: &Ground) -> Brush {
     let brush = if rng.bool() { random_brush(rng, ground) } else { random_sculpting_brush(rng, ground) };
     if rng.u32(0..8) > 0 {

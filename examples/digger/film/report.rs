@@ -97,9 +97,9 @@ pub struct Report {
     pub receipts: Durations,
     pub fields: usize,
     pub chunks: usize,
-    /// Of all that is drawn.
+    /// Seams of everything that is drawn.
     pub drawn_seams: SeamReport,
-    /// Of what was dug and built, at full detail.
+    /// Seams of what was dug and built, at full detail.
     pub edited_seams: SeamReport,
     pub memory: Memory,
     pub pictures: Vec<PathBuf>,

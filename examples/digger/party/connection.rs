@@ -35,7 +35,7 @@ pub enum Party {
     Guest(SocketAddr, u32),
 }
 
-/// Text that is no address.
+/// Text that is not an address.
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[error("{0:?} is not a valid address. Try 192.168.0.7 or 192.168.0.7:5100.")]
 pub struct NoAddress(String);

@@ -21,7 +21,7 @@ impl Plugin for ThrownPlugin {
     }
 }
 
-/// It was thrown this many seconds ago and is still hidden.
+/// A thrown object that is still hidden, and the seconds since it was thrown.
 #[derive(Component, Clone, Copy, Debug, Default)]
 struct JustThrown(f32);
 

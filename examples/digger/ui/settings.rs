@@ -23,11 +23,11 @@ pub struct Settings {
     pub field_of_view: f32,
     /// Metres up to which ground is visible; what is farther fades into the sky.
     pub view_distance: f32,
-    /// Of shadows, textures and far ground.
+    /// Quality of shadows, textures and far ground.
     pub quality: Quality,
     /// Factor for the size of menus and the heads-up display, as far as there is room.
     pub ui_scale: f32,
-    /// Of all sounds, with the feature `sound`.
+    /// Volume of all sounds, with the feature `sound`.
     pub volume: f32,
     /// Minutes from sunrise to sunrise; 0 stops the sun.
     pub day_minutes: f32,

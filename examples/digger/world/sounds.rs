@@ -56,7 +56,7 @@ const TIMBRES: [Timbre; 12] = [
 ];
 
 impl Sound {
-    /// Its samples, mono, between -1 and 1. They start and end in silence, and are the same each time.
+    /// The sound's samples, mono, between -1 and 1. They start and end in silence, and are the same each time.
     pub fn samples(self) -> Vec<f32> {
         let of = |material: MaterialId| TIMBRES[usize::from(material.0).min(TIMBRES.len() - 1)];
         finished(match self {
@@ -70,7 +70,7 @@ impl Sound {
         })
     }
 
-    /// Its loudness relative to other sounds, from 0 to 1.
+    /// The sound's loudness relative to other sounds, from 0 to 1.
     pub const fn volume(self) -> f32 {
         match self {
             Self::Explosion => 1.0,
@@ -102,7 +102,7 @@ fn strike(timbre: Timbre, seconds: f32, seed: u64) -> Vec<f32> {
     let Timbre { cutoff, decay, tone: (pitch, share) } = timbre;
     let noise = noise(seconds, seed, |_| cutoff);
     let strike = times(seconds).zip(noise).map(|(time, noise)| {
-        // Two partials that are no multiples of each other: a stone, not a flute.
+        // Two partials that are not multiples of each other: a stone, not a flute.
         let tone = (TAU * pitch * time).sin() + 0.5 * (TAU * 2.76 * pitch * time).sin();
         let start = (time / 0.002).min(1.0);
         start * ((1.0 - share) * noise * (-time / decay).exp() + share * tone * (-time / (1.6 * decay)).exp())

@@ -32,7 +32,7 @@ fn write(page: &mut String, measurements: &Measurements, machine: &Machine) -> s
          (2012), done again with this crate. Written by `make paper`; nothing here is typed by hand.\n"
     )?;
     if !machine.is_optimised {
-        writeln!(page, "**This is no release build: its times mean nothing.**\n")?;
+        writeln!(page, "**This is not a release build: its times mean nothing.**\n")?;
     }
     machines(page, measurements, machine)?;
     experiment(page, measurements)?;

@@ -78,7 +78,7 @@ impl Kernel {
         Self::SurfaceSpread,
     ];
 
-    /// Its name in the CUDA source.
+    /// The kernel's name in the CUDA source.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Scatter => "scatter",

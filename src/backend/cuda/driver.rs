@@ -121,7 +121,7 @@ impl Gpu {
             Some(number) => Some(number),
             None => number_of(gpu)?,
         };
-        let number = number.ok_or_else(|| Fault::NoDevice(format!("{gpu:?} is none of CUDA's")))?;
+        let number = number.ok_or_else(|| Fault::NoDevice(format!("{gpu:?} is not one of CUDA's")))?;
         Self::open_number(number, ptx)
     }
 

@@ -290,7 +290,9 @@ impl Cuda {
         if !fault.is_passing() {
             self.shared.disable(place, fault);
         } else if !self.has_warned.swap(true, Ordering::Relaxed) {
-            log::warn!("bevy_burrow runs on the CPU what is too large for the CUDA device: {fault}");
+            log::warn!(
+                "bevy_burrow falls back to the CPU for work that is too large for the CUDA device: {fault}"
+            );
         }
     }
 
@@ -319,8 +321,7 @@ impl Cuda {
     }
 
     /// Meshes blocks on the device, if it is chosen. `on_done` gets the surfaces; the result is how long it waited for
-    /// them. Without a result the CPU has to mesh the blocks, and anything that `on_done` made of surfaces is to be
-    /// discarded.
+    /// them. Without a result the CPU has to mesh the blocks, and the caller must discard what `on_done` produced.
     pub fn mesh(
         &self,
         view: &WorldView,

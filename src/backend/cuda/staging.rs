@@ -136,7 +136,7 @@ impl StrataInput {
         }
     }
 
-    /// Its address, 0 without strata.
+    /// The address of the table; 0 without strata.
     pub fn address(&self, input: &InputBuffer) -> Address {
         if self.table.is_some() { input.address(self.section) } else { 0 }
     }
@@ -164,7 +164,7 @@ impl DeviceBuffer {
         Ok(())
     }
 
-    /// Its address, once there is [room](Self::reserve).
+    /// The buffer's address, once there is [room](Self::reserve).
     pub fn address(&self) -> u64 {
         self.own.map_or(0, |(address, _)| address)
     }

@@ -25,7 +25,7 @@ const OF_A_SLAB: [usize; 2] = [128, 1024];
 /// The position of a brick in the tables.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry {
-    /// Its index.
+    /// The brick's index in the table.
     pub number: u32,
     /// Strides to the next brick: along x, and along z `<< 16`. Along y it is 1.
     pub strides: u32,

@@ -18,7 +18,7 @@ pub struct Capsule<N: Numbers = Voxels> {
     pub from: N::Vector,
     /// The other end.
     pub to: N::Vector,
-    /// Its radius.
+    /// The capsule's radius.
     pub radius: N::Length,
 }
 

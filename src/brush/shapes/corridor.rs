@@ -18,8 +18,8 @@ const HEIGHT: f32 = 256.0;
 /// The space along a path: as wide to either side as the path's radius, from `below` the path to `above` it. Its ends
 /// are round, and it is level across.
 ///
-/// [`Brush::road`](crate::brush::Brush::road) builds a road in it. Any other operation works too: dig it for a trench or
-/// a tunnel with a flat floor, paint it to give a road its material, reset it to remove a road.
+/// [`Brush::road`](crate::brush::Brush::road) builds a road in it. Any other operation works too: dig it for a trench
+/// or a tunnel with a flat floor, paint it to give a road its material, reset it to remove a road.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Corridor {
     /// The path along its floor, with half the width at each point as radius.
@@ -76,7 +76,7 @@ impl QuantizedCorridor {
         })
     }
 
-    /// As a brush has it.
+    /// Returns the corridor as a brush has it.
     pub fn restored(&self) -> Corridor {
         Corridor { path: self.path.restored(), above: voxels(self.above), below: voxels(self.below) }
     }

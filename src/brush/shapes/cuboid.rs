@@ -11,7 +11,7 @@ use crate::brush::quantize::matrix;
 /// A box, turned any way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Cuboid<N: Numbers = Voxels> {
-    /// Its middle.
+    /// The cuboid's middle.
     pub center: N::Vector,
     /// Half its sides, along its own axes.
     pub half: N::Vector,

@@ -21,13 +21,13 @@ const PIECES: usize = 32;
 /// which the radius changes evenly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Curve<N: Numbers = Voxels> {
-    /// Where it begins.
+    /// Where the curve begins.
     pub from: N::Vector,
     /// The second control point: the curve starts towards it.
     pub from_control: N::Vector,
     /// The third control point: the curve arrives from it.
     pub to_control: N::Vector,
-    /// Where it ends.
+    /// Where the curve ends.
     pub to: N::Vector,
     /// Radius at its beginning.
     pub from_radius: N::Length,

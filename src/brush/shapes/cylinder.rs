@@ -17,7 +17,7 @@ pub struct Cylinder<N: Numbers = Voxels> {
     pub base: N::Vector,
     /// From there to the centre of the other end.
     pub axis: N::Vector,
-    /// Its radius.
+    /// The cylinder's radius.
     pub radius: N::Length,
 }
 

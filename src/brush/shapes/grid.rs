@@ -109,7 +109,7 @@ impl QuantizedGrid {
         })
     }
 
-    /// As a brush has it.
+    /// Returns the grid as a brush has it.
     pub fn restored(&self) -> GridShape {
         GridShape {
             grid: self.samples.clone(),
@@ -199,8 +199,8 @@ pub(in crate::brush) struct GridMaterials {
 }
 
 impl GridMaterials {
-    /// The material at a lattice point: that of the nearest sample inside the shape among the eight around it, else of the
-    /// nearest at all. `None` if that has none.
+    /// The material at a lattice point: that of the nearest sample inside the shape among the eight around it, else of
+    /// the nearest at all. `None` if that has none.
     pub fn at(&self, point: IVec3) -> Option<MaterialId> {
         let own = &self.distance;
         let from = point.as_i64vec3() * i64::from(ONE) - IVec3::from_array(self.center).as_i64vec3();

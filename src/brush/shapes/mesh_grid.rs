@@ -1,8 +1,8 @@
 //! Grids of signed distances to closed triangle meshes.
 //!
 //! A sample is inside where the mesh's winding number around it is not 0. In a closed mesh this is the number of
-//! triangles that a ray leaves through, less those that it enters through. Vertices are rounded to a fine lattice, and a
-//! ray through an edge belongs to exactly one of its triangles, so no ray slips through and every number is exact.
+//! triangles that a ray leaves through, less those that it enters through. Vertices are rounded to a fine lattice, and
+//! a ray through an edge belongs to exactly one of its triangles, so no ray slips through and every number is exact.
 
 use glam::{DVec3, I64Vec3, IVec3, Quat, UVec3, Vec3};
 use rustc_hash::FxHashMap;
@@ -73,8 +73,8 @@ impl ShapeGrid {
         Self::of_mesh(positions, triangles, samples).map(|(mesh, _)| mesh)
     }
 
-    /// The grid of a closed mesh like [`from_mesh`](Self::from_mesh), with a material for each triangle: a sample has that of
-    /// the triangle nearest to it. A [fill](crate::brush::Brush::fill) builds with them.
+    /// The grid of a closed mesh like [`from_mesh`](Self::from_mesh), with a material for each triangle: a sample has
+    /// that of the triangle nearest to it. A [fill](crate::brush::Brush::fill) builds with them.
     ///
     /// # Errors
     /// Those of `from_mesh`, and [`BrushError::MeshMaterials`] if there are not as many materials as triangles.

@@ -78,7 +78,7 @@ use crate::lattice::ONE;
 
 /// The integer geometry of a shape. All methods except `check` may rely on checked numbers.
 pub(super) trait ShapeGeometry {
-    /// Its distance function.
+    /// The type of the shape's distance function.
     type Distance: Distance;
 
     /// Longest side of the box around it.
@@ -101,7 +101,7 @@ pub(super) trait ShapeGeometry {
     /// Volume in cubes of 1/256 voxel.
     fn volume(&self) -> f64;
 
-    /// Its distance function.
+    /// The shape's distance function.
     fn distance(&self) -> Self::Distance;
 }
 
@@ -256,7 +256,7 @@ macro_rules! shapes {
                 })
             }
 
-            /// Where it lies, for shapes that may be invalid too.
+            /// Where the shape lies, for shapes that may be invalid too.
             #[cfg_attr(not(feature = "plugin"), expect(dead_code))]
             pub(crate) fn extent(&self) -> Extent {
                 match self {
@@ -345,7 +345,7 @@ macro_rules! shapes {
                 volume / f64::from(ONE * ONE * ONE)
             }
 
-            /// Its distance function.
+            /// The shape's distance function.
             pub(super) fn form(&self) -> ShapeSdf {
                 match self {
                     $(Self::$name(shape) => ShapeSdf::$name(shape.distance()),)*
@@ -470,8 +470,8 @@ impl QuantizedShape {
         self.restore().unwrap_or(Shape::sphere(Vec3::ZERO, 0.0).into())
     }
 
-    /// At least the volume of all that lies within a distance of the shape, in cubes of 1/256 voxel, where that is known
-    /// to be much less than the volume of a box around it.
+    /// At least the volume of all that lies within a distance of the shape, in cubes of 1/256 voxel, where that is
+    /// known to be much less than the volume of a box around it.
     pub(super) fn volume_within(&self, grow: i32) -> Option<f64> {
         match self {
             Self::Path(path) => Some(path.volume_within(grow)),

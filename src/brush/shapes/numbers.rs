@@ -75,9 +75,9 @@ pub enum Kind {
 /// Converts the numbers of a shape, one after the other, each with the name of its field. A conversion of all
 /// points, for example, is then written once and not once for each shape.
 pub trait Convert {
-    /// What the fields hold.
+    /// The number type before conversion.
     type From: Numbers;
-    /// What they shall hold.
+    /// The number type after conversion.
     type To: Numbers;
 
     fn vector(

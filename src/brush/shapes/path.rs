@@ -25,8 +25,8 @@ pub(super) const LONGEST: i32 = 8192;
 /// The maximum number of straight pieces that stand for the curve between two points.
 const PIECES: i32 = 32;
 
-/// A path through points, with a radius at each. As a shape it is the tube around it: a tunnel if it is dug, a wall or a
-/// pipe if it is added.
+/// A path through points, with a radius at each. As a shape it is the tube around it: a tunnel if it is dug, a wall or
+/// a pipe if it is added.
 ///
 /// Radii change evenly from point to point. A path is one edit, however long it is, and costs as much as its tube is
 /// long.
@@ -47,7 +47,7 @@ const PIECES: i32 = 32;
 /// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BrushPath {
-    /// Its points in voxels, 2 to 256 of them, each with its radius.
+    /// The points in voxels, 2 to 256 of them, each with its radius.
     #[serde(with = "list")]
     pub points: Arc<[(Vec3, f32)]>,
     /// Whether it is a curve without kinks (Catmull-Rom). Otherwise it is made of straight lines.
@@ -155,14 +155,14 @@ impl QuantizedPath {
         Ok(Self { from: points[0].0, radius: points[0].1, is_smooth: path.is_smooth, steps })
     }
 
-    /// As a brush has it.
+    /// Returns the path as a brush has it.
     pub fn restored(&self) -> BrushPath {
         let points =
             self.corners().map(|(at, radius)| (restored_point(sum(self.from, at)), voxels(radius))).collect();
         BrushPath { points, is_smooth: self.is_smooth }
     }
 
-    /// Its points relative to the first one, with their radii.
+    /// The points relative to the first one, with their radii.
     fn corners(&self) -> impl Iterator<Item = ([i32; 3], i32)> {
         let mut at = [0; 3];
         let next = move |&(step, radius): &([i32; 3], i32)| {
@@ -196,7 +196,7 @@ impl QuantizedPath {
         nodes
     }
 
-    /// Its straight pieces: the ends, relative to the first point, and their radii.
+    /// The straight pieces: the ends, relative to the first point, and their radii.
     pub fn segments(&self) -> Vec<[([i32; 3], f32); 2]> {
         self.nodes().windows(2).map(|pair| [pair[0], pair[1]]).collect()
     }

@@ -219,8 +219,8 @@ impl ShapeGrid {
         if self.is_grid() { (i64::from(ZERO) - i64::from(self.0.least)).max(0) } else { 0 }
     }
 
-    /// Distance outside the shape at a sample, in 1/256 cell. Samples beyond the grid are those at its rim; without any,
-    /// as when it was read from an image that holds none, everything is outside.
+    /// Distance outside the shape at a sample, in 1/256 cell. Samples beyond the grid are those at its rim; without
+    /// any, as when it was read from an image that holds none, everything is outside.
     pub fn distance(&self, at: IVec3) -> i32 {
         if !self.is_grid() {
             return ZERO - 1;

@@ -12,9 +12,9 @@ use crate::brush::BrushError;
 /// A ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sphere<N: Numbers = Voxels> {
-    /// Its middle.
+    /// The sphere's middle.
     pub center: N::Vector,
-    /// Its radius.
+    /// The sphere's radius.
     pub radius: N::Length,
 }
 

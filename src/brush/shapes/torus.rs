@@ -13,7 +13,7 @@ use crate::brush::quantize::{disc, voxels};
 /// A ring: all that is nearer to a circle than the radius of the tube.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Torus<N: Numbers = Voxels> {
-    /// Its middle.
+    /// The torus's middle.
     pub center: N::Vector,
     /// The axis through its hole; only its direction matters.
     pub axis: N::Direction,

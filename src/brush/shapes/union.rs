@@ -1,7 +1,8 @@
 //! The union of many small pieces. Only the CPU computes it.
 //!
-//! Its distance is the least of the distances to its pieces. Neighbours in the list are expected to lie near each other,
-//! as the pieces of a path do: boxes around runs of them, in a tree, leave out those that are farther away than others.
+//! Its distance is the least of the distances to its pieces. Neighbours in the list are expected to lie near each
+//! other, as the pieces of a path do: boxes around runs of them, in a tree, leave out those that are farther away than
+//! others.
 
 use std::ops::Range;
 
@@ -62,8 +63,8 @@ fn rounding(distance: f32) -> f32 {
 #[derive(Clone, Debug)]
 pub struct Union<P> {
     pieces: Vec<P>,
-    /// Boxes around runs of pieces: of [`WIDTH`] pieces each in the first list, of [`WIDTH`] boxes of the list before in
-    /// each further one.
+    /// Boxes around runs of pieces: of [`WIDTH`] pieces each in the first list, of [`WIDTH`] boxes of the list before
+    /// in each further one.
     levels: Vec<Vec<Bounds>>,
 }
 

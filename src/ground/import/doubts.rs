@@ -9,7 +9,7 @@ use super::report::ImportNote;
 const PROBES: usize = 1 << 16;
 
 /// How wildly samples vary, for comparing ways to read the same bytes: the mean difference of neighbours as a share of
-/// what the type can hold, 0 to 1. Floats that are no plausible heights count as wild.
+/// what the type can hold, 0 to 1. Floats that are not plausible heights count as wild.
 pub(super) fn roughness(runs: impl Iterator<Item = impl Iterator<Item = f64>>, sample: SampleKind) -> f64 {
     let (mut sum, mut pairs) = (0.0, 0_u32);
     for run in runs {

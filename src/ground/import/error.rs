@@ -58,7 +58,7 @@ pub enum ImportError {
         format: HeightFormat,
         /// Column of the first sample that is not grey.
         x: u32,
-        /// Its row.
+        /// Row of that sample.
         z: u32,
     },
     /// The file has channels of which none is known to hold heights.
@@ -109,7 +109,7 @@ pub enum ImportError {
     Ascii {
         /// Number of the line, from 1.
         line: usize,
-        /// What is wrong with it.
+        /// What is wrong with the line.
         problem: String,
     },
     /// Heights cannot be written in a format.
@@ -137,7 +137,7 @@ pub enum ImportError {
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
     },
     /// There are outliers, which were to be refused.
@@ -150,17 +150,17 @@ pub enum ImportError {
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
-        /// Its value.
+        /// Value of the first one.
         value: f32,
     },
     /// A material map is not a PNG file.
-    #[error("this is no PNG file: export splat maps and id maps as PNG, without loss")]
+    #[error("this is not a PNG file: export splat maps and id maps as PNG, without loss")]
     MapFormat,
     /// A splat map has a palette.
     #[error(
-        "the splat map has a palette, whose entries are no weights: export it with colours, or read it as an id map"
+        "the splat map has a palette, whose entries are not weights: export it with colours, or read it as an id map"
     )]
     MapPalette,
     /// Splat maps have several sizes.
@@ -171,9 +171,9 @@ pub enum ImportError {
     MapSize {
         /// The file's place in the list.
         file: usize,
-        /// Its samples in a row.
+        /// Samples in a row of the file.
         width: u32,
-        /// Its rows.
+        /// Rows of the file.
         height: u32,
         /// The size of the first one.
         first: (u32, u32),
@@ -186,7 +186,7 @@ pub enum ImportError {
     Layers {
         /// Channels that `SplatOptions::layers` names.
         named: usize,
-        /// Those of them with a material.
+        /// Named channels that have a material.
         layers: usize,
         /// Channels of all files.
         channels: usize,
@@ -200,7 +200,7 @@ pub enum ImportError {
         found: String,
         /// Column of the sample.
         x: u32,
-        /// Its row.
+        /// Row of the sample.
         z: u32,
     },
     /// A surface has more materials than splat maps have channels.
@@ -213,7 +213,7 @@ pub enum ImportError {
         /// The maximum number of layers.
         most: usize,
     },
-    /// The distance between samples is no whole number of voxels.
+    /// The distance between samples is not a whole number of voxels.
     #[error(
         "samples that are {spacing} apart do not fit voxels of {voxel_size}: choose a voxel size that goes into the \
          distance 1 to 64 times, and project files in degrees to metres first"
@@ -231,7 +231,7 @@ pub enum ImportError {
         name: &'static str,
         /// The value given.
         value: f64,
-        /// What it may be.
+        /// The allowed values.
         allowed: &'static str,
     },
     /// Tiles do not make a rectangle.
@@ -243,7 +243,7 @@ pub enum ImportError {
         column: i32,
         /// Row of the tile.
         row: i32,
-        /// What is wrong with it.
+        /// What is wrong with the tile.
         problem: String,
     },
 }

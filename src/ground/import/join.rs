@@ -10,11 +10,11 @@ use super::report::ImportNote;
 /// A tile of a larger grid.
 #[derive(Clone, Debug)]
 pub struct ElevationTile {
-    /// Its place along x; the lowest one is the grid's first column.
+    /// The tile's place along x; the lowest one is the grid's first column.
     pub column: i32,
-    /// Its place along z; the lowest one is the grid's top row.
+    /// The tile's place along z; the lowest one is the grid's top row.
     pub row: i32,
-    /// Its samples.
+    /// The tile's samples.
     pub grid: ElevationGrid,
 }
 

@@ -19,8 +19,8 @@ pub const MAX_LAYERS: usize = 16;
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SplatOptions {
-    /// The material of each channel of all files, one after the other: red, green, blue and alpha, or the grey of a file
-    /// with one channel. `None` ignores a channel. At most [`MAX_LAYERS`] have a material.
+    /// The material of each channel of all files, one after the other: red, green, blue and alpha, or the grey of a
+    /// file with one channel. `None` ignores a channel. At most [`MAX_LAYERS`] have a material.
     pub layers: Vec<Option<MaterialId>>,
     /// The material below the surface. `None`: the strongest layer goes all the way down, and blends with the second
     /// strongest on the surface.
@@ -40,8 +40,8 @@ impl SplatOptions {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IdOptions {
-    /// The material of each id. An id is the grey of a sample, or the entry of a palette, as the file has it. Without any,
-    /// the id is the material itself.
+    /// The material of each id. An id is the grey of a sample, or the entry of a palette, as the file has it. Without
+    /// any, the id is the material itself.
     pub ids: Vec<(u16, MaterialId)>,
     /// The material of each colour, for files with colours; exactly these.
     pub colours: Vec<([u8; 3], MaterialId)>,
@@ -83,11 +83,11 @@ pub enum MaterialNote {
     },
     /// Samples without any weight got the first layer.
     NoWeight {
-        /// Their number.
+        /// Number of such samples.
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
     },
     /// A channel without a layer has weight.
@@ -110,7 +110,7 @@ impl fmt::Display for MaterialNote {
             Self::AlphaIgnored { file } => write!(f, "the alpha channel of file {file} was ignored"),
             Self::LooksOpaque { file } => write!(
                 f,
-                "the alpha channel of file {file} is full everywhere: if it is no layer, name `None` for it"
+                "the alpha channel of file {file} is full everywhere: if it is not a layer, name `None` for it"
             ),
             Self::NoWeight { count, x, z } => {
                 write!(f, "{count} samples have no weight, first ({x}, {z}): they got the first layer")
@@ -176,7 +176,7 @@ impl Pixels {
     }
 }
 
-/// The weights of a file: its channels without those that are no weights.
+/// The weights of a file: its channels without those that are not weights.
 struct Weights {
     pixels: Pixels,
     channels: usize,

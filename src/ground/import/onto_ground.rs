@@ -18,7 +18,7 @@ pub struct ElevationScale {
     /// Voxels from one sample to the next, along x and z: 1 to [`MAX_VOXELS_PER_SAMPLE`]. Between samples heights
     /// follow Catmull-Rom splines, as with [`ImageScale`](crate::ground::ImageScale).
     pub voxels_per_sample: u32,
-    /// What values mean.
+    /// What the values of samples mean.
     pub heights: HeightScale,
     /// Small-scale noise for what the samples are too coarse to show.
     pub detail: Option<Detail>,

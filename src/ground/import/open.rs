@@ -131,7 +131,7 @@ fn format_of(bytes: &[u8]) -> Result<HeightFormat, ImportError> {
     });
     match found {
         Some(&(_, found)) => Err(ImportError::Format { found }),
-        None if is_text => Err(ImportError::Format { found: "a text that is no Esri ASCII grid" }),
+        None if is_text => Err(ImportError::Format { found: "a text that is not an Esri ASCII grid" }),
         None => Ok(HeightFormat::Raw),
     }
 }

@@ -75,12 +75,12 @@ impl ImportOptions {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Repair {
-    /// They are kept and reported; voids stay NaN, from which no ground can be made.
+    /// Such samples are kept and reported; voids stay NaN, from which no ground can be made.
     Keep,
-    /// They are interpolated from what surrounds them.
+    /// Such samples are interpolated from what surrounds them.
     #[default]
     Fill,
-    /// They are moved to the nearest plausible value.
+    /// Such samples are moved to the nearest plausible value.
     Clamp,
     /// The file is refused, with the place of the first one.
     Refuse,

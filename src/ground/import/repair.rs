@@ -12,7 +12,7 @@ use super::report::ImportNote;
 /// Values that programs write for samples without one.
 const WELL_KNOWN: [f32; 4] = [-32_768.0, -32_767.0, -9_999.0, -99_999.0];
 
-/// Floats this far from zero are no heights but the ends of the type, which mean void.
+/// Floats this far from zero are not heights but the type's limits, which mean void.
 const ENDLESS: f32 = 1e30;
 
 /// Pairs of neighbours of which the usual difference is found.

@@ -79,13 +79,13 @@ pub enum ImportNote {
     },
     /// Samples far from all around them were found.
     Outliers {
-        /// Their number.
+        /// Number of outliers.
         count: u64,
         /// Column of the first one.
         x: u32,
-        /// Its row.
+        /// Row of the first one.
         z: u32,
-        /// Its value.
+        /// Value of the first one.
         value: f32,
     },
     /// All samples have the same value.
@@ -161,7 +161,8 @@ impl ImportReport {
     /// in metres. Where the file says nothing, its samples are a voxel apart.
     ///
     /// # Errors
-    /// [`ImportError::Spacing`] if the samples are not 1 to 64 whole voxels apart, as those of files in degrees are not.
+    /// [`ImportError::Spacing`] if the samples are not 1 to 64 whole voxels apart, as those of files in degrees are
+    /// not.
     pub fn scale(&self, voxel_size: f64) -> Result<ElevationScale, ImportError> {
         let heights = HeightScale::Units { voxels_per_unit: voxel_size.recip(), base: 0.0 };
         let [x, z] = self.spacing.unwrap_or([voxel_size; 2]);

@@ -110,7 +110,7 @@ pub trait HeightSource: Send + Sync + 'static {
     }
 
     /// Fills in materials, if [`Self::has_materials`] returns `true`. On entry every place holds material 0.
-    /// [`MaterialId::GROUND`](super::MaterialId::GROUND) is no material, and becomes 0.
+    /// [`MaterialId::GROUND`](super::MaterialId::GROUND) is not a material, and becomes 0.
     fn fill_materials(&self, _grid: ColumnGrid, _materials: &mut [ColumnMaterial]) {}
 
     /// Bytes of memory that it takes.

@@ -79,8 +79,8 @@ impl StrataRecords {
 pub(crate) struct LoneVoxel {
     pub column: Column,
     pub y: i32,
-    /// As strata count it, in 1/256 voxel: 0 above the surface.
+    /// The depth as strata count it, in 1/256 voxel: 0 above the surface.
     pub depth: i32,
-    /// As [`Ground::squared_slope`] gives it.
+    /// The squared slope, as [`Ground::squared_slope`] returns it.
     pub squared_slope: u64,
 }

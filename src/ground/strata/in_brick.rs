@@ -50,26 +50,26 @@ pub(super) fn with_brick<R>(
 pub(super) struct BrickStrata {
     /// Which strata, by their [id](StrataRecords::id), and which brick. No strata have id 0.
     key: (u64, IVec3),
-    /// Of the columns, rows along x.
+    /// Heights of the columns, in rows along x.
     heights: [[i32; 8]; 8],
-    /// Those whose noise is known.
+    /// Strata whose noise is known.
     hashed: u32,
     /// By the numbers of strata.
     noises: Vec<Noises>,
     /// The eighths that are known: a bit each.
     known_eighths: u8,
-    /// Those with low and high x, the same at high z, and all four at high y.
+    /// The eighths at low and high x, then both at high z, then all four at high y.
     eighths: [Eighth; 8],
 }
 
 /// The strata in an eighth of a brick.
 #[derive(Clone, Copy, Default)]
 struct Eighth {
-    /// Those that may hold a voxel of it.
+    /// Strata that may hold a voxel of the eighth.
     near: u32,
-    /// Those whose ranges hold all its voxels, so only the body and the column decide.
+    /// Strata whose ranges hold all voxels of the eighth, so only the body and the column decide.
     inside: u32,
-    /// Those whose bodies were looked for: the ones still near may be in it.
+    /// Strata whose bodies were looked for: the ones still near may be in it.
     bounded: u32,
 }
 
@@ -80,7 +80,7 @@ const HALF: i32 = BRICK / 2;
 #[derive(Clone, Copy, Default)]
 struct Noises {
     roughness: Corners,
-    /// Of beds, the first is the bedding's.
+    /// Noise of the body; for beds, the first is the bedding's.
     body: [Corners; 2],
 }
 
@@ -204,7 +204,7 @@ impl BrickStrata {
         }
     }
 
-    /// Those of a set of voxels of an eighth that a stratum holds.
+    /// The voxels of a set, in one eighth, that a stratum holds.
     #[inline]
     fn held_by(
         &mut self,
@@ -251,7 +251,7 @@ impl BrickStrata {
         held
     }
 
-    /// Those of a set of voxels of an eighth that a stratum holds, if its condition on the column is met.
+    /// The voxels of a set, in one eighth, that a stratum holds, if its condition on the column is met.
     #[inline(never)]
     fn held_by_noise(
         &mut self,

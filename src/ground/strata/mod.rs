@@ -112,9 +112,9 @@ impl Default for Bedding {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Stratum {
-    /// Its material; not [`MaterialId::GROUND`].
+    /// The material of the stratum; not [`MaterialId::GROUND`].
     pub material: MaterialId,
-    /// Its shape.
+    /// The shape of the stratum.
     pub body: StratumBody,
     /// The depth below the pristine surface, in voxels: from 0 on and below 1 for the highest solid voxel of a column,
     /// below 2 for the next. Voxels above the surface are at depth 0.
@@ -129,7 +129,7 @@ pub struct Stratum {
     pub rough_scale: u32,
     /// Distinguishes strata of the same material and shape, which otherwise lie in the same places.
     pub seed: u32,
-    /// Its bounds in the world.
+    /// Bounds of the stratum in the world.
     pub bounds: StratumBounds,
 }
 
@@ -186,9 +186,9 @@ pub enum StratumBody {
     Fill,
     /// A sheet that lies as the [`Bedding`] has it.
     Bed {
-        /// Its lower face in voxels, where the bedding is neither tilted nor folded.
+        /// The bed's lower face in voxels, where the bedding is neither tilted nor folded.
         from: f32,
-        /// Voxels up to its upper face, more than 0.
+        /// Voxels up to the bed's upper face, more than 0.
         thickness: f32,
         /// The voxels after which it repeats, more than its thickness; none for a single bed.
         every: Option<f32>,
@@ -229,7 +229,7 @@ pub enum StratumBounds {
 pub struct Interval {
     /// The first number, included.
     pub from: Option<f32>,
-    /// Where it ends, not included.
+    /// Where the interval ends, not included.
     pub to: Option<f32>,
 }
 

@@ -29,7 +29,7 @@ pub(crate) struct StratumRecord {
     pub seed: u32,
     /// The width of the body's noise in voxels, as a power of two.
     pub scale: u32,
-    /// Of veins, how far both noises may be from 0; of pockets, what the noise must exceed.
+    /// For veins, how far both noises may be from 0; for pockets, what the noise must exceed.
     pub limit: i32,
     /// Amplitude of the noise that moves ends.
     pub rough: i32,
@@ -37,7 +37,7 @@ pub(crate) struct StratumRecord {
     pub rough_scale: u32,
     pub depth: [i32; 2],
     pub height: [i32; 2],
-    /// Of beds: lower face, thickness, distance from one to the next or 0.
+    /// For beds: lower face, thickness, distance from one to the next or 0.
     pub bed: [i32; 3],
     /// The lowest y, and the first beyond.
     pub ys: [i32; 2],

@@ -10,7 +10,7 @@ use crate::lattice::{Column, ceil};
 /// The maximum number of lattice levels on a line between two columns of a steep cell.
 ///
 /// Each level is a vertex on every line, and a voxel whose material is computed. Faces of one cell's width that are
-/// higher are no cliffs but errors in the data, such as a void of a survey, whose height has no bound.
+/// higher are not cliffs but errors in the data, such as a void of a survey, whose height has no bound.
 pub(in crate::ground) const MAX_FACE_LEVELS: u32 = 64;
 
 impl SteepCells {

@@ -43,7 +43,7 @@ pub enum ClientEvent {
     UndoRefused(Option<Refusal>),
     /// An edit of another player or of the server.
     RemoteEdit {
-        /// Its author.
+        /// The author of the edit.
         author: ClientId,
         /// The result. Its tag is 0.
         receipt: Receipt,

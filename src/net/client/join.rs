@@ -18,7 +18,7 @@ use crate::terrain::Patch;
 pub(super) enum Stage {
     /// There is no connection.
     Disconnected,
-    /// It has greeted and waits for its welcome.
+    /// The client has greeted and waits for its welcome.
     AwaitingWelcome,
     /// Old entries arrive, up to the number `to`. The server has seen edits of this client up to the
     /// number `sequence`.
@@ -27,7 +27,7 @@ pub(super) enum Stage {
     ByRegions { to: u64, left: usize },
     /// The table of regions at a number arrives.
     ByTable { to: u64 },
-    /// It follows the log.
+    /// The client follows the log.
     Following,
 }
 

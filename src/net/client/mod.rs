@@ -263,8 +263,8 @@ impl Client {
         self.replica.shown_hash()
     }
 
-    /// The order that repairs a shown terrain with this world, for example because a change was refused there. It takes the
-    /// place of everything that [`take_shown`](Self::take_shown) would return now.
+    /// The order that repairs a shown terrain with this world, for example because a change was refused there. It takes
+    /// the place of everything that [`take_shown`](Self::take_shown) would return now.
     pub fn show_whole(&mut self, shown: &World) -> Order {
         let (_, receipts) = self.replica.update();
         self.shown.clear();
@@ -272,7 +272,7 @@ impl Client {
         self.replica.whole(shown)
     }
 
-    /// Its statistics.
+    /// The client's statistics.
     pub fn figures(&self) -> ClientFigures {
         let (drafts, drafted) = (self.replica.drafts(), self.replica.drafted());
         ClientFigures { drafts, drafted, ..self.figures }

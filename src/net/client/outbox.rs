@@ -16,12 +16,12 @@ enum Item {
     Undo(ClientId),
 }
 
-/// What it costs.
+/// The cost of an item.
 #[derive(Clone, Copy)]
 struct Cost {
-    /// As soon as it arrives.
+    /// The cost as soon as the item arrives.
     known: u64,
-    /// At most.
+    /// The most that it can cost.
     most: u64,
 }
 

@@ -19,7 +19,8 @@ pub(super) fn put_edit(to: &mut Vec<u8>, before: &[u64], edit: &Edit, coder: &mu
     }
 }
 
-/// Writes edits of a client into messages that a server reads: of at most [`MAX_EDITS`] edits and [`MAX_TO_SERVER`] bytes.
+/// Writes edits of a client into messages that a server reads: of at most [`MAX_EDITS`] edits and [`MAX_TO_SERVER`]
+/// bytes.
 #[derive(Debug, Default)]
 pub(in crate::net) struct EditWriter {
     first: u64,

@@ -59,7 +59,7 @@ const KICKS: [KickReason; 8] = [
 const REFUSED_BY_GAME: u8 = 255;
 
 impl ToClient {
-    /// Its bytes.
+    /// Encodes the message.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut to = Vec::new();
         match self {
@@ -134,8 +134,8 @@ impl ToClient {
         }
     }
 
-    /// Reads a message from a server. Edits whose contents the table lacks get placeholders; the names of what is missing
-    /// are returned too.
+    /// Reads a message from a server. Edits whose contents the table lacks get placeholders; the names of what is
+    /// missing are returned too.
     pub(in crate::net) fn read(
         bytes: &[u8],
         ground: &Ground,

@@ -19,7 +19,7 @@ const GREETING: u8 = 5;
 const IMAGES: u8 = 6;
 
 impl ToServer {
-    /// Its bytes.
+    /// Encodes the message.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut to = Vec::new();
         match self {

@@ -24,9 +24,9 @@ const ASK_INTERVAL: Duration = Duration::from_secs(1);
 
 /// The data in the bulk lane after a welcome.
 enum Bulk {
-    /// These messages.
+    /// Messages that are sent as they are.
     Messages(Vec<Arc<[u8]>>),
-    /// These regions of a world.
+    /// Regions of a world.
     Regions(Snapshot, Vec<RegionPos>),
 }
 

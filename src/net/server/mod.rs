@@ -89,9 +89,9 @@ pub type Outgoing = (ClientId, Lane, Vec<u8>);
 /// An entry that was ordered and not yet applied.
 struct Ordered {
     entry: Entry,
-    /// Of an edit: the tag and the stroke that it had at its author's.
+    /// For an edit: its author's tag and stroke.
     labels: (u64, Option<u64>),
-    /// Of an edit.
+    /// For an edit: its cost.
     cost: u64,
 }
 
@@ -281,7 +281,7 @@ impl Server {
         }
     }
 
-    /// Its statistics.
+    /// The server's statistics.
     pub fn figures(&self) -> ServerFigures {
         self.figures
     }
@@ -387,7 +387,8 @@ impl Server {
     /// Orders an edit of the game, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
     ///
     /// # Errors
-    /// When it holds an image, grid or prefab that is not among the [contents](Self::contents_mut): no client could read it.
+    /// When it holds an image, grid or prefab that is not among the [contents](Self::contents_mut): no client could
+    /// read it.
     pub fn edit(&mut self, edit: Edit) -> Result<(), UnknownContent> {
         if !self.contents.can_send(&edit) {
             return Err(UnknownContent);

@@ -5,8 +5,8 @@ use std::time::Duration;
 use super::settings::ServerSettings;
 use crate::net::bucket::Rate;
 
-/// The rate at which a lane begins, in bytes a second. It is also the least rate: however little is acknowledged, a lane is
-/// never slower, so a wrong measurement cannot delay a client.
+/// The rate at which a lane begins, in bytes a second. It is also the least rate: however little is acknowledged, a
+/// lane is never slower, so a wrong measurement cannot delay a client.
 const FIRST: u64 = 256 << 10;
 
 /// The shortest time over which acknowledged bytes are counted.
@@ -15,7 +15,8 @@ const SPAN: Duration = Duration::from_millis(500);
 /// A line carries a rate if it delivers at least this percentage of what was sent in the same time.
 const CARRIED: u64 = 92;
 
-/// Measurements in a row that must show that the line does not carry a rate. A single one may only have met a lost packet.
+/// Measurements in a row that must show that the line does not carry a rate. A single one may only have met a lost
+/// packet.
 const FAILURES: u32 = 2;
 
 /// What the rate becomes, in percent: of itself while the line carries it, before and after the line's limit was met
@@ -27,8 +28,8 @@ const BACK: u64 = 85;
 /// The rate of a lane: it grows as long as the connection delivers everything that is sent, and otherwise falls below
 /// the rate of delivery, so that queues in the connection drain again.
 ///
-/// Delays are not looked at, because lanes are reliable: a lost packet delays all later ones, but after it has been sent
-/// again they arrive together, so it hardly changes what arrives in a longer time.
+/// Delays are not looked at, because lanes are reliable: a lost packet delays all later ones, but after it has been
+/// sent again they arrive together, so it hardly changes what arrives in a longer time.
 pub struct Pace {
     /// The greatest rate.
     most: Rate,
@@ -36,8 +37,8 @@ pub struct Pace {
     window: u64,
     rate: u64,
     phase: Phase,
-    /// Measurements in a row that show that the line does not carry the rate, and the most bytes a second among these and the one
-    /// before them: a lost packet makes one of them small.
+    /// Measurements in a row that show that the line does not carry the rate, and the most bytes a second among these
+    /// and the one before them: a lost packet makes one of them small.
     failures: u32,
     delivered: u64,
     has_met_limit: bool,
@@ -162,7 +163,7 @@ mod tests {
     struct Line {
         /// In bytes a second.
         rate: u64,
-        /// There and back.
+        /// The time there and back.
         way: Duration,
         /// Lost packets of a hundred, and the time after which they are sent again.
         lost: u32,

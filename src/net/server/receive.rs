@@ -113,7 +113,7 @@ impl Server {
                 SequenceCheck::Old => continue,
                 SequenceCheck::Impossible => return false,
             }
-            // One that is too large is refused, however often it comes: that is no flood.
+            // An edit that is too large is refused each time, and does not count as flooding.
             let cost = cost(self.terrain.world().grid(), &edit);
             let counted = cost.unwrap_or_default().min(self.settings.cost.burst / 16);
             if !self.may_go_on(client, counted, now) {

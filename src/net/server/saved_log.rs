@@ -261,7 +261,8 @@ impl State {
     }
 }
 
-/// A hash of everything that entries lead to: samples and their ground, revision, names of fields, rules, loose settings.
+/// A hash of everything that entries lead to: samples and their ground, revision, names of fields, rules, loose
+/// settings.
 fn state_of(terrain: &Terrain) -> u64 {
     let (world, mut hash) = (terrain.world(), Xxh3Default::new());
     for number in [world.hash(), world.revision(), world.next_field()] {

@@ -80,8 +80,8 @@ pub fn region_bytes((number, world): &Snapshot, pos: RegionPos, left: u32) -> Ve
     ToClient::Region(RegionContent { number: *number, pos, left, next_field, bricks, fields }).to_bytes()
 }
 
-/// How many regions may still be encoded in this call, for all clients together: each takes milliseconds, so this bounds a
-/// tick.
+/// How many regions may still be encoded in this call, for all clients together: each takes milliseconds, so this
+/// bounds a tick.
 #[derive(Debug, Default)]
 pub struct Encodings {
     left: usize,

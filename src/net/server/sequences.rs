@@ -17,9 +17,9 @@ pub(super) const MAX_SAVED: usize = 1024;
 /// The last edit of a player that the world holds.
 #[derive(Clone, Copy)]
 pub(super) struct Applied {
-    /// Its sequence number.
+    /// The edit's sequence number.
     pub sequence: u64,
-    /// Its number in the log.
+    /// The edit's number in the log.
     pub number: u64,
 }
 
@@ -27,9 +27,9 @@ pub(super) struct Applied {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SequenceCheck {
     New,
-    /// It was seen before.
+    /// The number was seen before.
     Old,
-    /// No honest client has it.
+    /// No honest client sends this number.
     Impossible,
 }
 

@@ -16,13 +16,13 @@ const STUCK: Duration = Duration::from_secs(5);
 
 /// The progress of a client.
 pub enum Stage {
-    /// It has not greeted yet.
+    /// The client has not greeted yet.
     Connected,
-    /// It had joined and has to begin again. What it asks for meanwhile is done, and its welcome says so.
+    /// The client had joined and has to begin again. What it asks for meanwhile is done, and its welcome says so.
     Stale,
-    /// It waits for its welcome.
+    /// The client waits for its welcome.
     Greeted(Hello),
-    /// It gets entries as they are ordered.
+    /// The client gets entries as they are ordered.
     Joined,
 }
 

@@ -60,8 +60,8 @@ pub struct ServerSettings {
     /// The most bytes of the bulk lane for each client. The lane begins at 256 KiB a second, or this rate if it is
     /// lower, and becomes faster as long as acknowledgements show that the client's connection keeps up.
     pub bulk: Rate,
-    /// Bytes of each lane that a client may not have acknowledged. In the main lane, one message is sent in any case; in the bulk
-    /// lane, there are more in proportion to its rate.
+    /// Bytes of each lane that a client may not have acknowledged. In the main lane, one message is sent in any case;
+    /// in the bulk lane, there are more in proportion to its rate.
     pub window: u64,
     /// The maximum size in bytes of a piece of the bulk lane.
     pub piece: usize,

@@ -129,8 +129,8 @@ impl Stroke {
         bricks.chain(fields).sum()
     }
 
-    /// The change that undoes it, if its result is still unchanged. Where others have changed the fields of a chunk since,
-    /// the fields there are made to fit what is edited afterwards.
+    /// The change that undoes it, if its result is still unchanged. Where others have changed the fields of a chunk
+    /// since, the fields there are made to fit what is edited afterwards.
     fn undone(&self, world: &World) -> Option<Patch> {
         let is_there =
             |(pos, own): (&BrickPos, &Option<Arc<Brick>>)| Brick::is_same(own.as_ref(), world.brick(*pos));

@@ -35,8 +35,8 @@ fn squared_length(way: I64Vec3) -> u128 {
 }
 
 impl Server {
-    /// Checks an edit, and charges its cost to the client's bucket; returns the cost. An edit without a cost reaches nothing
-    /// of the world.
+    /// Checks an edit, and charges its cost to the client's bucket; returns the cost. An edit without a cost reaches
+    /// nothing of the world.
     pub(super) fn validate(
         &mut self,
         client: ClientId,

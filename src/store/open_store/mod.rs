@@ -87,7 +87,7 @@ impl fmt::Debug for Store {
 /// A world that was opened.
 #[derive(Debug)]
 pub struct Opened {
-    /// Its terrain, which keeps a [log](Terrain::keep_log). Nothing is meshed, and there is no history.
+    /// The store's terrain, which keeps a [log](Terrain::keep_log). Nothing is meshed, and there is no history.
     pub terrain: Terrain,
     /// Commits after the last checkpoint, which were replayed.
     pub replayed: u64,

@@ -19,7 +19,7 @@ pub(super) struct Builder {
     vertices: Vec<Vertex>,
     indices: Vec<Number>,
     places: FxHashMap<IVec3, Number>,
-    /// Of the columns.
+    /// Shares of the columns.
     shares: Shares,
     /// Which cells are split across, row by row; see [`splits_across`](Self::splits_across).
     splits: Vec<bool>,
@@ -36,7 +36,7 @@ pub(super) fn page_vertex(page: &GroundPage, number: usize, column: Column, low:
 }
 
 impl Builder {
-    /// With the columns of a node whose cells have this stride.
+    /// A builder that begins with the columns of a node whose cells have this stride.
     pub fn new(ground: &Ground, low: Column, high: Column, stride: i32) -> Self {
         let along =
             |low: i32, high: i32| (low..high).step_by(stride as usize).chain([high]).collect::<Vec<i32>>();
@@ -63,8 +63,8 @@ impl Builder {
     }
 
     /// Whether the cell with its lowest corner at these places is split along (x, z + s)-(x + s, z), and not along
-    /// (x, z)-(x + s, z + s): the line whose middle is nearer to the ground. On a ridge that runs along the other one, each
-    /// cell would be a tooth.
+    /// (x, z)-(x + s, z + s): the line whose middle is nearer to the ground. On a ridge that runs along the other one,
+    /// each cell would be a tooth.
     pub fn splits_across(&self, [x, z]: [usize; 2]) -> bool {
         self.splits[z * (self.columns[0].len() - 1) + x]
     }

@@ -1,8 +1,8 @@
 //! The vertex of a lattice edge of any length (rules 8 and 9).
 //!
-//! A vertex depends on heights, edits and its edge alone, so changing the level of detail moves none. Where nodes of different
-//! levels meet, vertices of edges of different lengths may lie at the same place; there, all of them are the vertex of
-//! the shortest.
+//! A vertex depends on heights, edits and its edge alone, so changing the level of detail moves none. Where nodes of
+//! different levels meet, vertices of edges of different lengths may lie at the same place; there, all of them are the
+//! vertex of the shortest.
 
 use glam::IVec3;
 
@@ -20,7 +20,7 @@ const AXES: [IVec3; 3] = [IVec3::X, IVec3::Y, IVec3::Z];
 /// An edge of some level's lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Edge {
-    /// Its lower end.
+    /// The edge's lower end.
     pub p: IVec3,
     /// The axis it runs along.
     pub axis: usize,
@@ -57,7 +57,7 @@ impl Edge {
         Self { p, axis, length: size[axis] }
     }
 
-    /// Its upper end.
+    /// The edge's upper end.
     pub fn q(self) -> IVec3 {
         self.p + AXES[self.axis] * self.length
     }
@@ -70,7 +70,7 @@ impl Edge {
         view.is_solid(self.p) != view.is_solid(self.q())
     }
 
-    /// Both halves.
+    /// Both halves of the edge.
     fn halves(self) -> [Self; 2] {
         let length = self.length / 2;
         [Self { length, ..self }, Self { p: self.p + AXES[self.axis] * length, length, ..self }]

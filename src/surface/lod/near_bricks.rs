@@ -131,7 +131,7 @@ impl<'a> NearBricks<'a> {
         }
     }
 
-    /// Where they are, in no order.
+    /// Positions of the bricks, in no order.
     pub fn positions(&self) -> impl Iterator<Item = BrickPos> {
         let at = |(x, z): (i32, i32), y: i32| BrickPos(IVec3::new(x, y, z));
         self.stacks.iter().flat_map(move |(&stack, bricks)| bricks.iter().map(move |(y, _)| at(stack, *y)))

@@ -1,11 +1,11 @@
 //! Materials of coarse vertices: the shares of those that they stand for.
 //!
 //! A vertex of stride s stands for s x s columns. Where its material and those of its neighbours at that stride are all
-//! one, it is that; otherwise it has the shares of five of its columns. Single samples of a border between two materials
-//! would be a row of teeth, and single samples of what is speckled would be specks of the size of a cell.
+//! one, it is that; otherwise it has the shares of five of its columns. Single samples of a border between two
+//! materials would be a row of teeth, and single samples of what is speckled would be specks of the size of a cell.
 //!
-//! Where nodes of different levels meet, a column has the shares of the finest of them: so both show the same there, and
-//! what a node shows does not depend on coarser ones. Full detail stays as it is.
+//! Where nodes of different levels meet, a column has the shares of the finest of them: so both show the same there,
+//! and what a node shows does not depend on coarser ones. Full detail stays as it is.
 
 use rustc_hash::FxHashMap;
 
@@ -21,7 +21,8 @@ pub(super) struct Shares {
     pub mixes: Vec<MaterialMix>,
 }
 
-/// The shares of a grid of columns a stride apart, from the page of these columns and of those next to them on all sides.
+/// The shares of a grid of columns a stride apart, from the page of these columns and of those next to them on all
+/// sides.
 pub(super) fn shares_in(
     ground: &Ground,
     page: &GroundPage,
@@ -68,7 +69,7 @@ pub(super) struct FinerShares {
 }
 
 impl FinerShares {
-    /// Those of a node from `low` to `high`, with the strides of the nodes across its sides.
+    /// Computes the shares of a node from `low` to `high`, with the strides of the nodes across its sides.
     pub fn new(
         view: &LodView,
         low: Column,

@@ -19,7 +19,7 @@ impl Cell {
         Self { low, stride }
     }
 
-    /// Its four columns, counter-clockwise seen from above.
+    /// The cell's four columns, counter-clockwise seen from above.
     pub const fn corners(self) -> [Column; 4] {
         let (low, stride) = (self.low, self.stride);
         [low, low.offset(0, stride), low.offset(stride, stride), low.offset(stride, 0)]
@@ -36,9 +36,9 @@ impl Cell {
 pub(super) struct Interval {
     /// The axis across it, x (0) or z (2).
     pub axis: usize,
-    /// Where it is along that axis.
+    /// Where the interval is along that axis.
     plane: i32,
-    /// Where it begins along the other one.
+    /// Where the interval begins along the other one.
     pub start: i32,
     /// The strides of the cells below and above the plane.
     strides: [i32; 2],
@@ -88,7 +88,7 @@ impl Interval {
         self.column(along).at(y)
     }
 
-    /// Its columns at the finer stride.
+    /// The interval's columns at the finer stride.
     pub fn columns(self) -> [Column; 3] {
         [0, self.fine(), self.coarse()].map(|step| self.column(self.start + step))
     }

@@ -74,7 +74,7 @@ pub struct Borders {
 /// 8x8 cells: bit `z * 8 + x`.
 #[derive(Clone, Copy, Debug, Default)]
 struct Word {
-    /// Those in the mask.
+    /// Cells in the mask.
     own: u64,
     steep: u64,
 }
@@ -82,13 +82,13 @@ struct Word {
 /// 8x8 cells: bit `z * 8 + x`.
 #[derive(Clone, Copy, Debug, Default)]
 struct Patch {
-    /// Those in the mask.
+    /// Cells in the mask.
     own: u64,
-    /// Those with a neighbour that is in the mask or steep, in the order of [`Borders::SIDES`]; then the steep ones.
+    /// Cells with a neighbour that is in the mask or steep, in the order of [`Borders::SIDES`]; then the steep cells.
     lines: [u64; 5],
-    /// All of these.
+    /// Cells in the mask or in any of `lines`.
     touched: u64,
-    /// Those with a neighbour in the mask, but not in it themselves.
+    /// Cells with a neighbour in the mask, but not in it themselves.
     at_mask: u64,
 }
 
@@ -143,7 +143,7 @@ impl Borders {
         })
     }
 
-    /// Those of 8x8 cells that lie in the rectangle, with their bits. `(z, x)` in units of 8 cells.
+    /// Those cells of an 8x8 word that lie in the rectangle, with their bits. `(z, x)` in units of 8 cells.
     fn cells(&self, mut bits: u64, (z, x): (i32, i32)) -> impl Iterator<Item = (u32, Column)> {
         let (low, high) = (self.low, self.high);
         let next = move || {

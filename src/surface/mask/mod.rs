@@ -167,6 +167,6 @@ mod tests {
         let cells: Vec<i32> = (0..24).filter(|&x| view.contains(Column::new(x, 0))).collect();
         assert_eq!(cells, [2, 17]);
         assert_eq!([(0, 0), (1, 0), (2, 0)].map(|word| mask.replace_word(word, newer.word(word))), [7, 1, 0]);
-        assert_eq!(mask.words().count(), 2, "an empty word is no word");
+        assert_eq!(mask.words().count(), 2, "empty words are left out");
     }
 }

@@ -12,18 +12,18 @@ use crate::world::World;
 /// A change of a field in a commit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FieldChange {
-    /// It is new.
+    /// A field was created.
     Created(FieldId),
-    /// Its samples or its box changed.
+    /// A field's samples or box changed.
     Changed(FieldId),
-    /// It was merged into another field of its chunk.
+    /// A field was merged into another field of its chunk.
     Merged {
         /// The field that is gone.
         gone: FieldId,
         /// The field that holds its data now.
         into: FieldId,
     },
-    /// It was removed, because its edits were undone.
+    /// A field was removed, because its edits were undone.
     Removed(FieldId),
 }
 

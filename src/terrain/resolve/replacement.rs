@@ -1,5 +1,5 @@
-//! Replacements: bricks and fields in place of those of a world, for steps through history, resets, and parts from a save
-//! or from another machine.
+//! Replacements: bricks and fields in place of those of a world, for steps through history, resets, and parts from a
+//! save or from another machine.
 
 use std::sync::Arc;
 
@@ -33,8 +33,8 @@ pub(super) struct Replacement<'a> {
 }
 
 impl<'a> Replacement<'a> {
-    /// Compares the bricks of a change with those of the world. Without `counts`, voxels are not counted where the world is
-    /// pristine.
+    /// Compares the bricks of a change with those of the world. Without `counts`, voxels are not counted where the
+    /// world is pristine.
     pub fn new(scene: Scene<'a>, change: Change, counts: bool, mut stages: Stages) -> Self {
         let world = scene.world;
         let compare = |(pos, brick): &ChangedBrick| {

@@ -10,11 +10,11 @@ use bevy::prelude::*;
 
 use super::bake::{Layers, Meter};
 
-/// The folder in which this crate keeps the textures that it paints, so that the next start need not paint them again. Without
-/// a folder, the default, nothing is written. Insert it before the first [`GroundLook`](super::GroundLook).
+/// The folder in which this crate keeps the textures that it paints, so that the next start need not paint them again.
+/// Without a folder, the default, nothing is written. Insert it before the first [`GroundLook`](super::GroundLook).
 ///
-/// A file takes 45 MB for textures of 512 texels a side. It is not used if it is damaged, or if another version of this crate
-/// would paint other textures; then it is replaced. A folder that can't be written is no error: a warning is logged.
+/// A file takes 45 MB for textures of 512 texels a side. It is not used if it is damaged, or if another version of this
+/// crate would paint other textures; then it is replaced. A folder that can't be written only causes a warning.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -25,7 +25,7 @@ use super::bake::{Layers, Meter};
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
 pub struct GroundTextureCache(pub Option<PathBuf>);
 
-/// What files begin with.
+/// The first bytes of each file.
 const MAGIC: [u8; 8] = *b"burrow\x00\x01";
 
 /// The bytes before those of the arrays: what files begin with, and a checksum.
@@ -133,7 +133,7 @@ mod tests {
         for damaged in damages.into_iter().chain(cut) {
             fs::write(&file, damaged).expect("writable");
             assert_eq!(fetch(&coarse), (coarse.clone(), true), "it is damaged");
-            assert_eq!(fs::read(&file).expect("readable"), whole, "and mended");
+            assert_eq!(fs::read(&file).expect("readable"), whole, "and written again");
         }
 
         // Other recipes paint another file, and the old one goes.

@@ -24,11 +24,13 @@ pub enum GroundTexturesError {
         source: Arc<AssetLoadError>,
     },
     /// An image is not an array of layers, but for example an ordinary picture.
-    #[error("the {image} is no array of layers but {view:?}: GroundArrays makes arrays of ordinary pictures")]
+    #[error(
+        "the {image} is not a texture array but {view:?}: GroundArrays makes arrays of ordinary pictures"
+    )]
     NoArray {
         /// `albedo` or `relief`.
         image: &'static str,
-        /// Its view dimension; the renderer needs [`TextureViewDimension::D2Array`].
+        /// The image's view dimension; the renderer needs [`TextureViewDimension::D2Array`].
         view: TextureViewDimension,
     },
     /// An image has texels that the GPU can't filter: integers, depths, on most GPUs also 32-bit floats.
@@ -36,7 +38,7 @@ pub enum GroundTexturesError {
     Format {
         /// `albedo` or `relief`.
         image: &'static str,
-        /// Its format.
+        /// The image's format.
         format: TextureFormat,
     },
     /// An image has several samples per texel.

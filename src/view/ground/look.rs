@@ -40,8 +40,8 @@ pub struct GroundLook {
     pub color_map: Option<ColorMap>,
 }
 
-/// A picture of the whole ground from above, such as a satellite image or the colour map of a terrain tool. Far from the camera,
-/// layers keep their texture and take the picture's colours, except for faces that were dug.
+/// A picture of the whole ground from above, such as a satellite image or the colour map of a terrain tool. Far from
+/// the camera, layers keep their texture and take the picture's colours, except for faces that were dug.
 ///
 /// It is stretched over the terrain: its first row lies at z = 0, and the first pixel of each row at x = 0. When its
 /// file changes and Bevy's asset server watches files, the ground changes too.
@@ -101,8 +101,8 @@ impl Default for GroundLayer {
     }
 }
 
-/// The texture fetches per pixel. A pixel shows its two strongest layers, each projected from the two sides that the surface
-/// faces most: one on level ground.
+/// The texture fetches per pixel. A pixel shows its two strongest layers, each projected from the two sides that the
+/// surface faces most: one on level ground.
 #[derive(Reflect, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[reflect(Default)]
 pub enum GroundQuality {

@@ -18,14 +18,15 @@ use super::super::vertex::prepass_vertex_shader;
 use super::look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
 use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT};
 
-/// The material of terrains with a [`GroundLook`]: lit like Bevy's `StandardMaterial`, with colour, roughness and relief from
-/// layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do there.
+/// The material of terrains with a [`GroundLook`]: lit like Bevy's `StandardMaterial`, with colour, roughness and
+/// relief from layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do
+/// there.
 ///
 /// Meshes without the attributes of a terrain show layer 0.
 pub type GroundMaterial = ExtendedMaterial<GroundBase, GroundExtension>;
 
-/// What a [`GroundMaterial`] has in common with Bevy's `StandardMaterial`, without that material's textures and samplers, of
-/// which GPUs have few: none of its fields has one.
+/// What a [`GroundMaterial`] has in common with Bevy's `StandardMaterial`, without that material's textures and
+/// samplers, of which GPUs have few: none of its fields has one.
 #[derive(Asset, AsBindGroup, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Default, Clone, PartialEq)]
 #[uniform(99, BaseUniform)]

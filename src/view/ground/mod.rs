@@ -9,11 +9,12 @@
 //!
 //! # How layers meet
 //!
-//! The corners of a triangle list the same materials, each with a weight that is blended between them: linear along any edge,
-//! whichever triangle one comes from. Noise of about the size of a cell multiplies the weights, so that borders do not run along
-//! edges of triangles. A pixel samples its two strongest layers, less the weight of the third one, so that none comes or goes
-//! with a jump, and where both weigh nearly the same their heights decide which is on top. So what shows is always what a vertex
-//! of the triangle has, and a border strays from the middle between two vertices by less than half their distance.
+//! The corners of a triangle list the same materials, each with a weight that is blended between them: linear along any
+//! edge, whichever triangle one comes from. Noise of about the size of a cell multiplies the weights, so that borders
+//! do not run along edges of triangles. A pixel samples its two strongest layers, less the weight of the third one, so
+//! that none comes or goes with a jump, and where both weigh nearly the same their heights decide which is on top. So
+//! what shows is always what a vertex of the triangle has, and a border strays from the middle between two vertices by
+//! less than half their distance.
 
 mod bake;
 mod cache;

@@ -55,7 +55,8 @@ const DIRECTIONS: [[f32; 2]; 8] = [
     [0.0, -1.414],
 ];
 
-/// Gradient noise, about -1 to 1, that repeats after `period` lattice steps; `u` and `v` go from 0 to 1 over the period.
+/// Gradient noise, about -1 to 1, that repeats after `period` lattice steps; `u` and `v` go from 0 to 1 over the
+/// period.
 pub(super) fn gradient(u: f32, v: f32, period: i32, seed: u32) -> f32 {
     let (x, y) = (u * period as f32, v * period as f32);
     let (i, j) = (floor(x), floor(y));

@@ -150,7 +150,8 @@ fn mean_color(four: [[u8; 4]; 4], to_light: &[f32; 256]) -> [u8; 4] {
     })
 }
 
-/// Directions and occlusion are averaged as they are. What directions vary by makes the mean rougher, or it would sparkle.
+/// Directions and occlusion are averaged as they are. What directions vary by makes the mean rougher, or it would
+/// sparkle.
 fn mean_relief(four: [[u8; 4]; 4]) -> [u8; 4] {
     let mean = |channel: usize| four.iter().map(|texel| f32::from(texel[channel]) / 255.0).sum::<f32>() / 4.0;
     let roughness = mean_roughness(four);

@@ -1,5 +1,5 @@
-//! The layers that the project paints itself, from noise alone: rock, grass, sand, snow, clay, concrete, coal, gold, soil,
-//! sandstone, shale, gravel, iron and copper.
+//! The layers that the project paints itself, from noise alone: rock, grass, sand, snow, clay, concrete, coal, gold,
+//! soil, sandstone, shale, gravel, iron and copper.
 
 use super::noise::{cells, chance, gradient, octaves, ridges, smooth};
 
@@ -16,7 +16,7 @@ pub(super) struct Point {
 
 /// How a layer is painted.
 pub(super) struct Recipe {
-    /// Its name, for logs.
+    /// The recipe's name, for logs.
     pub name: &'static str,
     /// Metres from height 0 to height 1, as wide as [`Recipe::metres`].
     pub relief: f32,
@@ -77,8 +77,8 @@ fn lit(color: [f32; 3], factor: f32) -> [f32; 3] {
     color.map(|part| part * factor)
 }
 
-/// Grey and craggy, with lichen. Joints are a matter of relief more than of colour, and most of them end somewhere: a net of
-/// dark lines would make the repetition of the layer visible.
+/// Grey and craggy, with lichen. Joints are a matter of relief more than of colour, and most of them end somewhere: a
+/// net of dark lines would make the repetition of the layer visible.
 fn rock(u: f32, v: f32) -> Point {
     let (wu, wv) = (u + 0.06 * octaves(u, v, 4, 4, 11), v + 0.06 * octaves(u, v, 4, 4, 12));
     let crag = ridges(wu, wv, 3, 6, 13);
@@ -325,8 +325,8 @@ fn pebble(u: f32, v: f32, period: i32, seldom: f32, seed: u32) -> (f32, f32) {
     ((2.0 * dome).min(0.75 + 0.25 * dome), number * 29.0 % 1.0)
 }
 
-/// Layers along `v`, each with a number and a thickness of its own: laminae of sediment. The number, and the way to the next
-/// border, 0 there and 1 in the middle.
+/// Layers along `v`, each with a number and a thickness of its own: laminae of sediment. The number, and the way to the
+/// next border, 0 there and 1 in the middle.
 fn laminae(u: f32, v: f32, count: i32, bend: f32, seed: u32) -> (f32, f32) {
     let at = (v + bend * octaves(u, v, 3, 4, seed)) * count as f32;
     let border = |number: i32| number as f32 + 0.7 * (chance(number.rem_euclid(count), 8, seed) - 0.5);
@@ -343,8 +343,8 @@ fn laminae(u: f32, v: f32, count: i32, bend: f32, seed: u32) -> (f32, f32) {
     (chance(layer.rem_euclid(count), 7, seed), within.min(1.0 - within) * 2.0)
 }
 
-/// Sheets that lie flat, each worn away up to a ragged border: what [`laminae`] are from above. As they, a number and the
-/// way to the next border.
+/// Sheets that lie flat, each worn away up to a ragged border: what [`laminae`] are from above. As they, a number and
+/// the way to the next border.
 fn sheets(u: f32, v: f32, count: f32, seed: u32) -> (f32, f32) {
     let at = (1.5 + octaves(u, v, 2, 6, seed)) * count;
     let within = at - at.floor();

@@ -27,14 +27,16 @@ pub enum GroundTextures {
     Baked {
         /// Texels along a side: a power of two from 16 to 2048, else the next larger one.
         side: u32,
-        /// How much sharper than usual slanting ground is filtered, 1 (not at all) to 16. Software renderers go without.
+        /// How much sharper than usual slanting ground is filtered, 1 (not at all) to 16. Software renderers go
+        /// without.
         anisotropy: u16,
     },
     /// A game's own: two arrays with one layer for each material id, alike in number and size, with mip levels and
     /// samplers that repeat. [`GroundArrays`](super::GroundArrays) makes them of ordinary pictures;
     /// a warning is logged if arrays differ, or have fewer layers than a look names.
     ///
-    /// Images that can't be loaded, or are no arrays that can be filtered, are not used: see [`GroundLoading::failure`].
+    /// Images that can't be loaded, or are not arrays that can be filtered, are not used: see
+    /// [`GroundLoading::failure`].
     ///
     /// A software renderer goes without anisotropic filtering, which would take it minutes for each frame: where one of
     /// the samplers has it, or is the app's default one, both arrays are read with one that repeats and is linear.
@@ -139,8 +141,8 @@ impl Renderer {
 
 impl GroundLoading {
     /// From 0 (nothing requested, or just started) to 1 (all terrains are textured). While other textures are made,
-    /// terrains keep the old ones, or else show coarse ones, and this starts again at 0. After a [`failure`](Self::failure) it
-    /// never reaches 1.
+    /// terrains keep the old ones, or else show coarse ones, and this starts again at 0. After a
+    /// [`failure`](Self::failure) it never reaches 1.
     pub fn progress(&self) -> f32 {
         if self.is_current { 1.0 } else { self.meter.progress().min(0.99) }
     }

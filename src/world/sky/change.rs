@@ -27,10 +27,10 @@ const MOVED: i16 = i16::MAX;
 /// A box around what changes of all that light depends on: tops, and which samples are solid.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChangedBox {
-    /// Its columns, both ends included.
+    /// The lowest and the highest column, both included.
     pub low: Column,
     pub high: Column,
-    /// Its heights, in 1/256 voxel.
+    /// The lowest and the highest point, in 1/256 voxel.
     pub bottom: i32,
     pub top: i32,
 }

@@ -110,7 +110,7 @@ pub(super) fn capped(slope: i16) -> u8 {
     slope.clamp(0, u8::MAX.into()) as u8
 }
 
-/// Of a direction with this horizon, the share of the sky that lies below it, 0..=255.
+/// The share of the sky that lies below the horizon of a direction, 0..=255.
 #[inline(always)]
 pub(super) fn below(capped: u8) -> u16 {
     BELOW[usize::from(capped)].into()

@@ -344,11 +344,11 @@ const AROUND: [(i32, i32); DIRECTION_COUNT] = [
 /// directions. Their slopes are 0.45, 1 and 2.24.
 const RAYS: [[(i32, i32); 3]; 2] = [[(13, 114), (9, 256), (5, 572)], [(9, 162), (7, 362), (4, 810)]];
 
-/// Rays of some 14 voxels that rise or fall slightly, with a slope of 0.25 at most, for every fourth direction: no other
-/// ray in their directions goes farther.
+/// Rays of some 14 voxels that rise or fall slightly, with a slope of 0.25 at most, for every fourth direction: no
+/// other ray in their directions goes farther.
 const LEVEL_RAYS: [(i32, i32); 4] = [(14, 64), (12, 72), (10, 90), (12, 72)];
 
-/// Of the level directions, those in which the open is seen count up to this number: a place with as much light of the
+/// The maximum number of level directions with a view of the open that count: a place with as much light of the
 /// sky, which has more rays that get out and so take long, needs none.
 const MAX_LEVEL: u32 = 5;
 

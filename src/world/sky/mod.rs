@@ -65,7 +65,7 @@ struct Newer {
 struct NewerStack {
     /// The heights of its bricks after the commit, ascending.
     rows: Vec<i32>,
-    /// Its tops before and after the commit: computed when they are first needed.
+    /// The tops before and after the commit: computed when they are first needed.
     tops: OnceLock<[Option<StackTops>; 2]>,
 }
 

@@ -13,7 +13,7 @@ pub(crate) struct StackTops {
     pub changed: u64,
 }
 
-/// Those of a stack; `None` where it holds no bricks.
+/// Computes the tops of a stack; `None` where it holds no bricks.
 pub(crate) fn stack_tops(view: SkyView, stack: (i32, i32)) -> Option<StackTops> {
     let rows = view.rows(stack);
     let lowest = *rows.first()?;

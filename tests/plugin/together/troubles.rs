@@ -1,4 +1,4 @@
-//! Whatever keeps a player from digging together is answered, reported, and said once.
+//! Errors in multiplayer: every pending edit gets an answer, and each error is reported once.
 
 use bevy::math::DVec3;
 use bevy::prelude::*;
@@ -89,7 +89,7 @@ fn a_shared_terrain_without_the_plugin_is_a_terrain() {
 }
 
 #[test]
-fn a_server_that_lacks_plugins_says_so() {
+fn missing_plugins_cause_no_panic() {
     // Without replicon nothing is shared, and nothing panics.
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, BurrowPlugins, TogetherPlugin))

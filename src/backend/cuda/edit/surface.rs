@@ -1,7 +1,7 @@
 //! Distances to the surface of the ground, which fills and carves need.
 //!
-//! They are computed for the bricks of those edits and for the bricks around them that ways may lead through: first of the
-//! samples next to the surface, then they spread launch by launch. `edits/surface_distance.rs` has the definition.
+//! They are computed for the bricks of those edits and for the bricks around them that ways may lead through: first of
+//! the samples next to the surface, then they spread launch by launch. `edits/surface_distance.rs` has the definition.
 
 use glam::IVec3;
 
@@ -41,8 +41,8 @@ fn bricks_away(horizon: i32) -> i32 {
     (steps(horizon) + BRICK - 1) / BRICK
 }
 
-/// Lists the bricks whose distances to the surface some fill or carve depends on, in order, with their neighbours, and sets
-/// the jobs' numbers in the list.
+/// Lists the bricks whose distances to the surface some fill or carve depends on, in order, with their neighbours, and
+/// sets the jobs' numbers in the list.
 pub(in super::super) fn surface_jobs(work: &PreparedEdits, jobs: &mut [EditJob]) -> Vec<SurfaceJob> {
     let away_of = |job: &EditJob| {
         let own = work.jobs().iter().skip(job.first as usize).take(job.count as usize);
@@ -63,8 +63,8 @@ pub(in super::super) fn surface_jobs(work: &PreparedEdits, jobs: &mut [EditJob])
     listed(&bricks)
 }
 
-/// Bricks with all bricks around them that lie in the world. Beyond its rim everything continues as at the rim, so no way
-/// through there is shorter.
+/// Bricks with all bricks around them that lie in the world. Beyond its rim everything continues as at the rim, so no
+/// way through there is shorter.
 fn with_neighbours(bricks: &[BrickPos], grid: ChunkGrid) -> Vec<BrickPos> {
     let is_inside = |at: i32, last: i32| at * BRICK + BRICK > 0 && at * BRICK <= last;
     let in_world = |pos: &BrickPos| is_inside(pos.0.x, grid.width()) && is_inside(pos.0.z, grid.depth());

@@ -16,7 +16,7 @@ pub(crate) const MOST_LIST: usize = 1 << 23;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EditJob {
-    /// Its [`BrickPos`].
+    /// The brick's [`BrickPos`].
     pub brick: [i32; 3],
     /// Reference of the current brick.
     pub base: u32,
@@ -24,7 +24,7 @@ pub(crate) struct EditJob {
     pub target: u32,
     /// Slot of its ground stack.
     pub stack: u32,
-    /// Its edits in order, a range of `list`.
+    /// The brick's edits in order, a range of `list`.
     pub first: u32,
     pub count: u32,
     /// See [`cuts`].

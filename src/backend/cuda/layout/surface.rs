@@ -14,7 +14,7 @@ pub(crate) const DISTANCE_BYTES: usize = 1024;
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct SurfaceJob {
-    /// Its [`BrickPos`].
+    /// The brick's [`BrickPos`].
     pub brick: [i32; 3],
     /// As in [`EditJob`](super::EditJob).
     pub stack: u32,

@@ -105,7 +105,7 @@ fn open_each_of_three_gpus() {
     }
     let others = [GpuChoice::Ordinal(3), GpuChoice::Ordinal(u32::MAX), GpuChoice::Uuid([9; 16])];
     for gpu in others.into_iter().chain(["0000:09:00.0", "", "anywhere", "0000:01:00.0\0"].map(bus)) {
-        assert!(open(&gpu, None).is_err_and(|why| why.contains("none of CUDA's")), "{gpu:?}");
+        assert!(open(&gpu, None).is_err_and(|why| why.contains("not one of CUDA's")), "{gpu:?}");
         assert_eq!(open(&default, Some(&gpu)), Ok("gpu 0".into()));
     }
     assert_eq!(open(&default, None), Ok("gpu 0".into()));
@@ -186,6 +186,6 @@ fn ground_that_can_not_be_made_gives_the_same_error_on_a_device() {
         assert!(expected.is_err());
         assert_eq!(engine.ground_from_noise(width, 30, &noise), expected);
     }
-    // Rejected heights are no fault of the device.
+    // Rejected heights are not a fault of the device.
     assert_eq!(engine.state(), EngineState::Cuda(name));
 }

@@ -75,7 +75,8 @@ impl SkyColumns<'_> {
         horizons
     }
 
-    /// Raises the horizons of eight columns to the tops near them that were dug or built, or are seen from such columns.
+    /// Raises the horizons of eight columns to the tops near them that were dug or built, or are seen from such
+    /// columns.
     #[inline(always)]
     fn raise_near<T: Height>(
         &self,
@@ -116,7 +117,7 @@ impl SkyColumns<'_> {
         Run { start: all.start - REACH - NEAR_REACH, end: all.end - REACH + NEAR_REACH }
     }
 
-    /// Those of them that see changed tops near them in a direction, or are changed.
+    /// The run of columns that see changed tops near them in a direction, or are changed.
     fn near_run_ahead(&self, z: usize, direction: usize) -> Run {
         let row = z as i32 + REACH;
         let run = |dx: i32, dz: i32| match self.runs.get((row + dz) as usize) {

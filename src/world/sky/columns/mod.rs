@@ -30,12 +30,12 @@ pub(crate) struct SkyColumns<'a> {
     tops: Vec<i32>,
     /// -1 for columns whose top is not the ground's own height, others 0. Empty if there are none.
     changed: Vec<i16>,
-    /// For each row of all columns, those between which such columns lie. Empty if there are none.
+    /// For each row of all columns, the run that holds such columns. Empty if there are none.
     runs: Vec<Run>,
-    /// Their tops once more, if they lie within 256 voxels: computed when they are first needed.
+    /// The tops once more, if they lie within 256 voxels: computed when they are first needed.
     low_tops: OnceCell<Option<LowTops>>,
     lowest: OnceCell<i32>,
-    /// On the tops of the rectangle's columns, for those rows for which it was asked.
+    /// Light on the tops of the rectangle's columns, for the rows for which it was asked.
     lights: Vec<u8>,
     is_lit: Vec<bool>,
     known: AirMemory<Option<AirLight>>,
@@ -44,7 +44,7 @@ pub(crate) struct SkyColumns<'a> {
 }
 
 impl<'a> SkyColumns<'a> {
-    /// Those from `low` to `high`, both included.
+    /// The columns from `low` to `high`, both included.
     pub fn new(view: SkyView<'a>, low: Column, high: Column) -> Self {
         let first = low.offset(-REACH, -REACH);
         let last = high.offset(REACH, REACH);
@@ -247,8 +247,8 @@ impl<'a> SkyColumns<'a> {
         &self.lights
     }
 
-    /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices. Where that
-    /// was dug, it is the light on the ground below.
+    /// The light over the rectangle's columns at the ground's own height, x fastest: that of a tile's vertices. Where
+    /// that was dug, it is the light on the ground below.
     pub fn ground_lights(&mut self) -> Vec<Light> {
         let mut lights: Vec<Light> = self.lights().iter().map(|&sky| Light::open(sky)).collect();
         let width = self.size[0];

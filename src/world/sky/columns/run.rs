@@ -10,7 +10,7 @@ pub(in crate::world::sky) struct Run {
 }
 
 impl Run {
-    /// Its ends are far enough apart that it stays empty wherever it is moved.
+    /// An empty run whose ends are so far apart that it stays empty wherever it is moved.
     pub const EMPTY: Self = Self { start: i32::MAX / 2, end: i32::MIN / 2 };
 
     pub fn is_empty(self) -> bool {
@@ -26,7 +26,7 @@ impl Run {
         Self { start: self.start + by, end: self.end + by }
     }
 
-    /// Those of its columns that an array of this length holds.
+    /// The part of the run that an array of this length holds.
     pub fn within(self, length: usize) -> Range<usize> {
         let [start, end] = [self.start, self.end].map(|at| at.clamp(0, length as i32) as usize);
         start..end.max(start)

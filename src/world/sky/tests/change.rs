@@ -124,7 +124,8 @@ fn scenes(seed: u32) -> [Scene; 5] {
     ]
 }
 
-/// What is drawn whose light differs between two worlds that draw the same shapes there, without parts that are drawn again.
+/// What is drawn whose light differs between two worlds that draw the same shapes there, without parts that are drawn
+/// again.
 fn otherwise_lit(before: &World, after: &World, is_drawn_anew: impl Fn(MeshKey) -> bool) -> Vec<MeshKey> {
     let tiles = before.grid().tiles().map(MeshKey::Tile);
     let all = tiles.chain(before.drawn_chunks().map(MeshKey::Chunk)).filter(|drawn| !is_drawn_anew(*drawn));

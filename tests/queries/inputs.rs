@@ -1,4 +1,4 @@
-//! The worlds and places that are queried.
+//! Random worlds and positions for the query tests.
 
 use bevy_burrow::lattice::Column;
 use bevy_burrow::prelude::*;

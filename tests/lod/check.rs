@@ -1,4 +1,4 @@
-//! What a cut draws, as triangles in the world, and what is wrong with them.
+//! Draws a cut and counts its faults.
 
 use std::collections::BTreeMap;
 
@@ -23,7 +23,7 @@ pub fn draw(world: &World, cut: &Cut) -> Drawings {
 pub struct Counts {
     pub worlds: usize,
     pub triangles: usize,
-    /// Of nodes above level 0.
+    /// Triangles of nodes above level 0.
     pub coarse: usize,
     pub open: usize,
     pub unbalanced: usize,
@@ -32,7 +32,7 @@ pub struct Counts {
     /// Triangles without area that do not lie in a plane between levels.
     pub flat: usize,
     pub nonmanifold_edges: usize,
-    /// Those of them that do not lie over an alternating corner.
+    /// Non-manifold edges that do not lie over an alternating corner.
     pub stray: usize,
     /// Vertices at one place with different normals.
     pub normal_jumps: usize,

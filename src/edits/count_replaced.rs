@@ -1,4 +1,4 @@
-//! Replaces one state of a brick by another, for undo and redo.
+//! Counts the voxels that differ between two states of a brick, for undo and redo.
 
 use super::effect::EditEffect;
 use crate::ground::{Ground, MaterialId};
