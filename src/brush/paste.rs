@@ -124,8 +124,8 @@ impl Paste {
         let flip = if self.mirror { Vec3::new(-1.0, 1.0, 1.0) } else { Vec3::ONE };
         let middle = (self.prefab.size() - 1).as_vec3() / 2.0;
         let from_anchor = (middle - self.prefab.anchor().as_vec3()) * flip * self.scale;
-        // A quarter of a voxel beyond its outer samples, which lie inside then.
-        let half = middle * self.scale + 0.25;
+        // Beyond its outer samples, which lie inside then: by a quarter of a voxel, whichever unit its places have.
+        let half = middle * self.scale + 0.25 * self.scale.max(1.0);
         Shape::turned_cuboid(self.at + self.turn() * from_anchor, half, self.rotation)
     }
 

@@ -53,7 +53,7 @@ impl ImageLimits {
     }
 
     /// Checks the dimensions that a file declares, and the memory for them at `bytes_per_sample`.
-    pub(super) fn check_image(
+    pub(crate) fn check_image(
         &self,
         width: u32,
         height: u32,

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::state::World;
-use crate::ground::{ElevationGrid, ImportError};
+use crate::ground::{ElevationGrid, ImageLimits, ImportError};
 use crate::lattice::{Column, ONE};
 
 impl World {
@@ -15,6 +15,7 @@ impl World {
     /// [`ImportError::Limit`] for a world of more than 16385 columns along a side.
     pub fn elevation(&self) -> Result<ElevationGrid, ImportError> {
         let (width, depth) = (self.ground().width(), self.ground().depth());
+        self.check_map_size()?;
         let height = |x: i32, z: i32| {
             let is_edited = [x - 1, x + 1]
                 .iter()
@@ -26,5 +27,12 @@ impl World {
         let rows = (0..=depth).into_par_iter();
         let samples = rows.flat_map_iter(|z| (0..=width).map(move |x| height(x, z))).collect();
         ElevationGrid::from_samples(width as u32 + 1, depth as u32 + 1, samples)
+    }
+
+    /// Checks that a map with a sample for each column is within the limits of images, before any memory is taken.
+    pub(super) fn check_map_size(&self) -> Result<(), ImportError> {
+        let limits = ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() };
+        let [width, depth] = [self.ground().width(), self.ground().depth()].map(|side| side as u32 + 1);
+        Ok(limits.check_image(width, depth, 4)?)
     }
 }

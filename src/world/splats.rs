@@ -24,9 +24,11 @@ impl World {
     /// sum up to 255. [`MaterialMap::decode_splats`](crate::ground::MaterialMap::decode_splats) reads them again.
     ///
     /// # Errors
-    /// [`ImportError::TooManyMaterials`] for a surface of more than 16 materials.
+    /// [`ImportError::TooManyMaterials`] for a surface of more than 16 materials, [`ImportError::Limit`] for a world of
+    /// more than 16384 columns along a side.
     pub fn splat_maps(&self) -> Result<SplatMaps, ImportError> {
         let (width, depth) = (self.ground().width(), self.ground().depth());
+        self.check_map_size()?;
         let top = |x: i32, z: i32| {
             let is_edited = [x - 1, x + 1]
                 .iter()

@@ -230,6 +230,41 @@ fn meshes_with_holes_and_grids_of_wrong_sizes_are_refused() {
     assert!(inside(Vec3::ZERO) && inside(Vec3::X * 40.0) && !inside(Vec3::X * 20.0));
 }
 
+/// Where boxes overlap or share a face, no air stays between them, though the face may lie exactly on samples.
+#[test]
+fn faces_within_a_shape_leave_no_air() {
+    for (second, scale) in [(5.0, 1.0), (10.0, 1.0), (5.0, 0.25)] {
+        let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+        for from in [0.0, second] {
+            let first = positions.len() as u32;
+            let corner = |bits: u32| {
+                Vec3::new((bits & 1) as f32, (bits >> 1 & 1) as f32, (bits >> 2) as f32) * 10.0
+                    + Vec3::X * from
+            };
+            positions.extend((0..8).map(corner));
+            let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+            triangles.extend(
+                faces
+                    .iter()
+                    .flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]])
+                    .map(|t| t.map(|at| first + at)),
+            );
+        }
+        let mesh = ShapeGrid::from_mesh(&positions, &triangles, second as u32 + 15).expect("closed");
+        assert_eq!(mesh.cell, 1.0);
+        let mut terrain =
+            Terrain::new(Ground::flat(64, 64, 0.0).expect("valid"), &TerrainSettings::default())
+                .expect("valid");
+        let place = Vec3::new(20.0, 20.0, 20.0);
+        terrain.apply([Brush::add(mesh.placed(place, Quat::IDENTITY, scale), MaterialId(2))]);
+        let samples = terrain.world().samples();
+        let size = (Vec3::new(second + 10.0, 10.0, 10.0) * scale).as_ivec3();
+        for at in (LatticeBox { min: place.as_ivec3() + 1, max: place.as_ivec3() + size - 1 }).points() {
+            assert!(samples.is_solid(at), "{at} with boxes at 0 and {second}, {scale} times");
+        }
+    }
+}
+
 #[test]
 fn a_mesh_off_its_origin_lies_where_its_points_go() {
     let mut mesh = cave(400);

@@ -46,8 +46,8 @@ impl MeshGrid {
 impl ShapeGrid {
     /// The grid of a closed mesh, with this many samples along its longest side: 8 to 128.
     ///
-    /// Points are inside where the mesh's winding number is not 0, so parts may overlap and face either way. Vertices
-    /// with equal positions count as one. Distances are exact within two cells of the surface, and roughly right
+    /// Points are inside where the mesh's winding number is not 0, so parts may overlap if they face the same way; a
+    /// part inside another that faces the other way is a hole. Vertices with equal positions count as one. Distances are exact within two cells of the surface, and roughly right
     /// beyond.
     ///
     /// ```
@@ -134,12 +134,22 @@ impl ShapeGrid {
         check_closed(&triangles)?;
         let winding = winding_numbers(size, &triangles);
         let distances = distances(size, &triangles);
+        let is_inside = |index: usize| winding.get(index).is_some_and(|own| *own != 0);
+        let [row, layer] = [size.x as usize, (size.x * size.y) as usize];
         let signed: Vec<i32> = distances
             .iter()
-            .zip(&winding)
-            .map(|((distance, _), winding)| {
+            .enumerate()
+            .map(|(index, (distance, _))| {
                 let distance = (distance * f32::from(ONE as i16)).round_ties_even() as i32;
-                if *winding == 0 { distance.max(1) } else { -distance }
+                // Where parts overlap, a face of the one may lie inside the other.
+                let is_within = [1, row, layer]
+                    .iter()
+                    .all(|step| is_inside(index + step) && index >= *step && is_inside(index - step));
+                match (is_inside(index), is_within) {
+                    (false, _) => distance.max(1),
+                    (true, false) => -distance.max(1),
+                    (true, true) => -distance.max(ONE / 2),
+                }
             })
             .collect();
         let nearest = distances
@@ -175,10 +185,12 @@ impl ShapeGrid {
     ) -> Result<MeshGrid, BrushError> {
         let (mut positions, mut corners, mut materials) = (Vec::new(), Vec::new(), Vec::new());
         for (mesh, place, material) in meshes {
+            // A mirrored mesh would face inwards.
+            let order = if place.matrix3.determinant() < 0.0 { [0, 2, 1] } else { [0, 1, 2] };
             for triangle in mesh.triangles().map_err(|_| BrushError::NoTriangles)? {
                 let first = positions.len() as u32;
                 positions.extend(triangle.vertices.map(|vertex| place.transform_point3(vertex)));
-                corners.push([first, first + 1, first + 2]);
+                corners.push(order.map(|corner| first + corner));
                 materials.push(material);
             }
         }
