@@ -40,9 +40,9 @@ const MODULES: &[&str] = &[
     "panel",
 ];
 
-/// The most names that the documentation shows in public modules, and functions of `Terrain`. What a game needs is
+/// The most names that the documentation shows in public modules, those within them too, and functions of `Terrain`. What a game needs is
 /// shown; what only tools and tests need is `#[doc(hidden)]`, or behind the feature `tools`.
-const SHOWN_NAMES: usize = 303;
+const SHOWN_NAMES: usize = 398;
 const TERRAIN_FUNCTIONS: usize = 37;
 
 /// The text of a crate's files, by path below `src`.
@@ -449,12 +449,13 @@ fn only_one_file_names_the_transport() {
     assert_eq!(files_that_name(&sources, "bevy_replicon").len(), 2);
 }
 
-/// A public item: the name that it introduces, the block that it is in, such as `impl Terrain`, and whether it is
-/// hidden from the documentation.
+/// A public item: the name that it introduces, the block that it is in, such as `impl Terrain`, whether it is hidden
+/// from the documentation, and whether it is a module.
 struct PublicItem {
     name: String,
     block: String,
     is_hidden: bool,
+    is_module: bool,
 }
 
 /// The public items of a file, at its top level and in its `impl` blocks.
@@ -474,6 +475,7 @@ fn public_items(text: &str) -> Vec<PublicItem> {
             ";" => head.clear(),
             "pub" if tokens.get(at + 1).is_some_and(|next| next != "(") && blocks.len() < 2 => {
                 let mut names = Vec::new();
+                let is_module = tokens[at + 1] == "mod";
                 if tokens[at + 1] == "use" {
                     at += 2;
                     read_tree(&tokens, &mut at, &[], &mut names);
@@ -491,6 +493,7 @@ fn public_items(text: &str) -> Vec<PublicItem> {
                     name,
                     block: block.clone(),
                     is_hidden,
+                    is_module,
                 }));
                 attributes.clear();
             }
@@ -505,17 +508,22 @@ fn public_items(text: &str) -> Vec<PublicItem> {
     items
 }
 
-/// The names that the documentation of a crate shows in its public modules, as `module::name`.
+/// The names that the documentation of a crate shows in its public modules and in those within them, as `module::name`.
 fn shown_names(sources: &Sources) -> Vec<String> {
     let modules = public_items(&sources["lib.rs"]).into_iter().filter(|module| !module.is_hidden);
-    let root =
-        |name: &str| sources.get(&format!("{name}/mod.rs")).or_else(|| sources.get(&format!("{name}.rs")));
-    let names = |module: PublicItem| {
-        let items = root(&module.name).map(|text| public_items(text)).unwrap_or_default();
-        let shown = items.into_iter().filter(|item| !item.is_hidden && item.block.is_empty());
-        shown.map(|item| format!("{}::{}", module.name, item.name)).collect::<Vec<_>>()
+    modules.flat_map(|module| shown_in(sources, &module.name)).collect()
+}
+
+/// The names that a module at this path shows.
+fn shown_in(sources: &Sources, module: &str) -> Vec<String> {
+    let text = ["/mod.rs", ".rs"].iter().find_map(|end| sources.get(&format!("{module}{end}")));
+    let items = text.map(|text| public_items(text)).unwrap_or_default();
+    let shown = items.into_iter().filter(|item| !item.is_hidden && item.block.is_empty());
+    let name = |item: PublicItem| match item.is_module {
+        true => shown_in(sources, &format!("{module}/{}", item.name)),
+        false => vec![format!("{}::{}", module.replace('/', "::"), item.name)],
     };
-    modules.flat_map(names).collect()
+    shown.flat_map(name).collect()
 }
 
 /// The public functions of a type that the documentation shows.
@@ -538,14 +546,18 @@ fn the_public_surface_does_not_grow_unnoticed() {
 
 #[test]
 fn public_items_are_counted_however_they_are_written() {
-    let lib = "pub mod a;\n#[doc(hidden)]\npub mod b;\nmod c;\npub(crate) mod d;";
+    let lib = "pub mod a;\npub mod e;\n#[doc(hidden)]\npub mod b;\nmod c;\npub(crate) mod d;";
     let a = "pub use x::{A, y::{B, C as D}};\n#[doc(hidden)]\npub use x::E;\n#[cfg(test)]\npub use x::F;\n\
              /// pub fn no() {}\npub const fn f() {}\npub struct S { pub field: u8 }\npub(crate) struct T;\n\
              impl S {\n pub fn one(&self) { g() }\n #[doc(hidden)]\n #[must_use]\n pub fn two() {}\n fn three() {}\n\
              #[must_use]\n pub const fn four() {} }\nimpl T { pub fn five() {} }";
-    let sources =
-        crate_of(&[("lib.rs", lib), ("a/mod.rs", a), ("b.rs", "pub struct G;"), ("c.rs", "pub struct H;")]);
-    assert_eq!(shown_names(&sources), ["a::A", "a::B", "a::D", "a::f", "a::S"]);
+    let sources = crate_of(
+        &[("lib.rs", lib), ("a/mod.rs", a), ("b.rs", "pub struct G;"), ("c.rs", "pub struct H;")]
+            .into_iter()
+            .chain([("e/mod.rs", "pub mod f;\npub struct I;"), ("e/f.rs", "pub struct J;\npub struct K;")])
+            .collect::<Vec<_>>(),
+    );
+    assert_eq!(shown_names(&sources), ["a::A", "a::B", "a::D", "a::f", "a::S", "e::f::J", "e::f::K", "e::I"]);
     assert_eq!(shown_functions(&sources, "a/", "S"), ["one", "four"]);
 }
 

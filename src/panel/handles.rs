@@ -7,8 +7,9 @@ use bevy_egui::egui::{
 use bevy_egui::{EguiContext, PrimaryEguiContext};
 
 use super::handle_geometry::{Axis, Frame, Handle, View};
+use super::input::PanelInput;
 use super::open_level::Files;
-use super::state::{BurrowPanel, PanelAction, PanelInput};
+use super::state::{BurrowPanel, PanelAction};
 use super::theme::{ACCENT, BAD, BLUE, BRIGHT, GOOD};
 use super::{BrushTool, texts, widgets};
 use crate::brush::Brush;

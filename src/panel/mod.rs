@@ -28,6 +28,7 @@ mod context;
 mod files;
 mod handle_geometry;
 mod handles;
+mod input;
 mod lengths;
 mod level;
 mod look_section;
@@ -52,7 +53,8 @@ mod tool_placed;
 mod widgets;
 mod world_column;
 
-pub use state::{BurrowPanel, PanelAction, PanelInput, PanelPlaces, keyboard_is_free, pointer_is_free};
+pub use input::{PanelInput, keyboard_is_free, pointer_is_free};
+pub use state::{BurrowPanel, PanelAction, PanelPlaces};
 #[doc(hidden)]
 pub use tool::{BrushTool, PATH_POINTS, StampImage, ToolAlign, ToolModel, ToolPrefab, ToolShape};
 pub use tool_operation::ToolOperation;
@@ -100,7 +102,7 @@ impl Plugin for BurrowPanelPlugin {
             .add_message::<PanelAction>()
             .add_systems(
                 PreUpdate,
-                (state::read_input, handles::hold_pointer).chain().after(EguiPreUpdateSet::BeginPass),
+                (input::read_input, handles::hold_pointer).chain().after(EguiPreUpdateSet::BeginPass),
             )
             .add_systems(
                 Update,

@@ -634,7 +634,7 @@ fn messages_of_success_expire() {
 #[test]
 fn any_context_of_egui_may_have_the_pointer() {
     let mut app = App::new();
-    app.init_resource::<PanelInput>().init_resource::<Files>().add_systems(Update, state::read_input);
+    app.init_resource::<PanelInput>().init_resource::<Files>().add_systems(Update, input::read_input);
     // The context of another camera than the panel's.
     let camera = app.world_mut().spawn(EguiContext::default()).id();
     let mut camera = app.world_mut().entity_mut(camera);

@@ -25,7 +25,7 @@ impl Stage {
             .init_resource::<Survey>()
             .init_resource::<EguiUserTextures>()
             .add_message::<PanelAction>()
-            .add_systems(PreUpdate, (state::read_input, handles::hold_pointer).chain())
+            .add_systems(PreUpdate, (input::read_input, handles::hold_pointer).chain())
             .add_systems(Update, (level::finish, handles::act, perform_actions, note_rejection).chain())
             .add_systems(Last, (handles::show, draw).chain());
         app.finish();
@@ -292,7 +292,7 @@ fn the_pointer_is_free_when_the_camera_is_gone() {
     world.despawn(camera);
     // Bevy's egui shows nothing without a camera, so what ran there no longer does.
     for _ in 0..2 {
-        stage.app.world_mut().run_system_cached(state::read_input).expect("it runs");
+        stage.app.world_mut().run_system_cached(input::read_input).expect("it runs");
         stage.app.world_mut().run_system_cached(handles::hold_pointer).expect("it runs");
     }
     assert!(!stage.is_held());
