@@ -154,6 +154,7 @@ pub(crate) use stencil::{FARTHEST, Stencil, is_moved};
 use crate::lattice::ONE;
 
 /// The default power of a brush, which removes everything that rules allow to be removed.
+#[doc(hidden)]
 pub const FULL_POWER: u8 = u8::MAX;
 
 /// Distance outside its shape within which an edit changes samples, in 1/256 voxel (rule 6).

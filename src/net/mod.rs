@@ -74,7 +74,9 @@ pub use bucket::Rate;
 #[doc(hidden)]
 pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
-pub use message::{ClientId, KickReason, Lane, MAX_TO_SERVER, PROTOCOL, Refusal};
+#[doc(hidden)]
+pub use message::MAX_TO_SERVER;
+pub use message::{ClientId, KickReason, Lane, PROTOCOL, Refusal};
 #[doc(hidden)]
 pub use message::{
     Entries, Entry, Epoch, Hello, Join, MAX_SEQUENCE_JUMP, RegionContent, RegionHashes, RuleState, ToClient,

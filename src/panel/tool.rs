@@ -132,6 +132,7 @@ impl Default for BrushTool {
 }
 
 /// The maximum number of points that a path of a [`BrushTool`] has before its last one.
+#[doc(hidden)]
 pub const PATH_POINTS: usize = 255;
 
 /// The shape of a [`BrushTool`].

@@ -32,7 +32,11 @@ pub use colliders::PlantCollidersPlugin;
 #[cfg(feature = "render")]
 pub use draw::{PlantDrawingPlugin, PlantLook, PlantLooks};
 #[cfg(feature = "render")]
-pub use material::{PlantExtension, PlantMaterial};
+#[doc(hidden)]
+pub use material::PlantExtension;
+#[cfg(feature = "render")]
+#[doc(hidden)]
+pub use material::PlantMaterial;
 
 use std::sync::Arc;
 

@@ -52,6 +52,7 @@ pub enum HeightmapError {
 /// Loads `.png`, `.raw` and `.r16` files as [`HeightmapImage`]. A `.png` needs its type, as in
 /// `load::<HeightmapImage>`; otherwise Bevy loads it as an ordinary image.
 #[derive(Default, TypePath)]
+#[doc(hidden)]
 pub struct HeightmapLoader;
 
 impl AssetLoader for HeightmapLoader {
@@ -93,6 +94,7 @@ pub(crate) async fn read_limited(reader: &mut dyn Reader, limit: u64) -> Result<
 
 /// Adds the heightmap asset and its loader, where there is an asset server.
 #[derive(Default)]
+#[doc(hidden)]
 pub struct HeightmapPlugin;
 
 impl Plugin for HeightmapPlugin {

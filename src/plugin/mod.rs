@@ -77,9 +77,14 @@ pub(crate) use entities::TerrainEntities;
 pub(crate) use entities::trigger_if_alive;
 pub use figures::BurrowFigures;
 #[cfg(feature = "format")]
+#[doc(hidden)]
+pub use ground_file::GroundFilePlugin;
+#[cfg(feature = "format")]
+#[doc(hidden)]
+pub use ground_file::GroundLoader;
+#[cfg(feature = "format")]
 pub use ground_file::{
-    GroundAsset, GroundDescription, GroundFileError, GroundFilePlugin, GroundFileRead, GroundFrom,
-    GroundLoader, MaterialFiles,
+    GroundAsset, GroundDescription, GroundFileError, GroundFileRead, GroundFrom, MaterialFiles,
 };
 #[doc(hidden)]
 pub use heightmap::{HeightmapError, HeightmapImage, HeightmapSettings, RawHeightmap};
@@ -116,9 +121,10 @@ pub(crate) use squares::squares_within;
 pub(crate) use squares::{Squares, are_same, position_on};
 #[doc(hidden)]
 pub use times::Times;
+#[doc(hidden)]
+pub use vertex_kind::CUT_VOXELS;
 pub use vertex_kind::{
     ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
-    CUT_VOXELS,
 };
 
 use bevy::ecs::reflect::ReflectMessage;

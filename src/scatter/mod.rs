@@ -52,7 +52,9 @@ mod species;
 mod spots;
 mod stands;
 
-pub use patches::{PatchPos, PlantChange, PlantPatch, PlantPatches};
+#[doc(hidden)]
+pub use patches::PlantChange;
+pub use patches::{PatchPos, PlantPatch, PlantPatches};
 pub use plants::{Plant, PlantId, Scatter};
 pub use query::PlantHit;
 pub use rules::{Clearance, Clusters, ScatterError, ScatterRules, Species, Stem, ViewDistances};

@@ -40,7 +40,9 @@ mod sources;
 mod unsaved;
 mod writer;
 
-pub use base_level::{BaseLevel, LevelName};
+pub use base_level::BaseLevel;
+#[doc(hidden)]
+pub use base_level::LevelName;
 pub use closing::ClosingStore;
 #[cfg(any(test, feature = "tools"))]
 #[doc(hidden)]

@@ -42,6 +42,7 @@ pub mod tile;
 #[doc(hidden)]
 pub mod vertex;
 
+#[doc(hidden)]
 pub use chunk_surface::ChunkSurface;
 pub(crate) use chunk_surface::{FreshPart, PartKey};
 #[doc(hidden)]

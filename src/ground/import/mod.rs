@@ -55,7 +55,9 @@ pub use error::ImportError;
 pub use grid::ElevationGrid;
 pub use join::{ElevationTile, TileEdges, tile_place};
 pub use kind::{HeightFormat, SampleKind};
-pub use materials::{IdOptions, MAX_LAYERS, MaterialNote, MaterialReport, SplatOptions};
+#[doc(hidden)]
+pub use materials::MAX_LAYERS;
+pub use materials::{IdOptions, MaterialNote, MaterialReport, SplatOptions};
 pub use onto_ground::{ElevationScale, HeightScale};
 pub use options::{ImportOptions, RawLayout, Repair};
 pub use report::{ImportNote, ImportReport};

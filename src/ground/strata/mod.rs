@@ -38,9 +38,11 @@ pub(in crate::ground) use steep::steep_word;
 pub(crate) use steep_cells::SteepCells;
 
 /// The maximum number of strata of a ground.
+#[doc(hidden)]
 pub const MAX_STRATA: usize = 32;
 
 /// The maximum number of strata of a ground that have a condition on columns: a slope, a box or a picture.
+#[doc(hidden)]
 pub const MAX_COLUMN_CONDITIONS: usize = 16;
 
 /// Bodies of material below the surface: soil, beds of rock, veins and pockets of ore.

@@ -32,8 +32,12 @@ mod textures;
 
 pub use cache::GroundTextureCache;
 pub use fit::GroundTexturesError;
-pub use look::{ColorMap, GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
-pub use material::{GroundBase, GroundExtension, GroundMaterial};
+#[doc(hidden)]
+pub use look::MAX_LAYERS;
+pub use look::{ColorMap, GroundLayer, GroundLook, GroundQuality};
+#[doc(hidden)]
+pub use material::GroundBase;
+pub use material::{GroundExtension, GroundMaterial};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
 
