@@ -75,7 +75,7 @@ use clap::Parser;
 
 use crate::party::connection::{Address, Party};
 use crate::ui::settings::{Quality, Settings, SettingsFile};
-use crate::world::saves::{self, PlayedWorld};
+use crate::world::saves::{self, WorldsFolder};
 
 /// A first-person game on a landscape that can be dug.
 #[derive(Parser, Clone, Debug)]
@@ -134,7 +134,7 @@ pub struct Options {
 impl Options {
     /// The folder of the world that was asked for.
     fn saved_world(&self) -> Option<PathBuf> {
-        self.world.as_deref().and_then(PlayedWorld::named)
+        self.world.as_deref().and_then(|name| WorldsFolder::of_user().named(name))
     }
 
     /// The players in it.
@@ -247,9 +247,10 @@ fn open_window(options: &Options) -> App {
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
     app.insert_resource(GroundTextureCache(saves::folder_of_textures()));
-    let new_world = || saves::create(&saves::new_name()?, 0).ok();
-    let world = options.saved_world().or_else(PlayedWorld::latest);
-    let world = world.or_else(|| options.host.and_then(|_| new_world()));
+    let worlds = WorldsFolder::of_user();
+    let world = options.saved_world().or_else(|| worlds.latest());
+    // Where that fails, "Play" says why.
+    let world = world.or_else(|| options.host.and_then(|_| worlds.create_next().ok()));
     game(&mut app, options.backend.engine(), SettingsFile::of_user(), world, options.party());
     // Low quality is for weak GPUs and software renderers.
     if options.plants || app.world().resource::<Settings>().quality != Quality::Low {

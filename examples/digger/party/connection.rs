@@ -13,16 +13,17 @@ use bevy_replicon::prelude::*;
 use bevy_replicon_renet::RepliconRenetPlugins;
 
 use super::udp;
-use crate::player::game_state::GameState;
 use crate::ui::hud::Hint;
 use crate::ui::texts;
-use crate::world::landscape::{self, NewGame, OriginalGround};
+use crate::world::landscape::{self, OriginalGround};
 use crate::world::saves::{NotOpened, PlayedWorld};
 
 /// Most players.
 const PLAYERS: usize = 16;
 /// Seconds until a lost connection is tried again.
 const RETRY_PAUSE: f32 = 2.0;
+/// How often a guest tries to join. One that has joined tries without an end.
+const TRIES: u32 = 3;
 
 /// The players in this world.
 #[derive(Resource, Clone, Debug, Default, PartialEq)]
@@ -85,9 +86,13 @@ pub fn own_address() -> Option<IpAddr> {
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct OwnNumber(pub u64);
 
-/// Seconds until a guest tries to connect.
+/// Seconds until a guest tries to connect, and how often it has tried.
 #[derive(Resource)]
-struct NextTry(f32);
+struct NextTry(f32, u32);
+
+/// Hosting or joining has failed, or the host has removed the player, for this reason.
+#[derive(Event, Clone, Debug)]
+pub struct ConnectionFailed(pub String);
 
 /// Shares the terrain with others.
 pub struct ConnectionPlugin(pub Party);
@@ -144,7 +149,7 @@ fn open(
             });
             commands.queue(move |world: &mut World| {
                 if let Err(why) = udp::listen(world, (Ipv4Addr::UNSPECIFIED, port).into(), PLAYERS) {
-                    world.write_message(Hint(texts::nobody_can_join(why)));
+                    world.trigger(ConnectionFailed(texts::nobody_can_join(why)));
                 }
             });
         }
@@ -152,7 +157,7 @@ fn open(
             if own.0 == 0 {
                 commands.insert_resource(OwnNumber(fastrand::u64(1..u64::MAX / 2)));
             }
-            commands.insert_resource(NextTry(0.0));
+            commands.insert_resource(NextTry(0.0, 0));
         }
     }
     Ok(())
@@ -193,12 +198,13 @@ fn close(_: On<Remove, SharedTerrain>, mut commands: Commands) {
     commands.queue(udp::leave);
 }
 
-/// Connects a guest, again and again.
+/// Connects a guest, again and again once it was in the host's world.
 fn connect(
     mut commands: Commands,
     time: Res<Time<Real>>,
     party: Res<Party>,
     own: Res<OwnNumber>,
+    shared: Query<&SharedTerrain>,
     next: Option<ResMut<NextTry>>,
 ) {
     let (&Party::Guest(server, _), Some(mut next)) = (&*party, next) else { return };
@@ -206,7 +212,11 @@ fn connect(
     if next.0 > 0.0 {
         return;
     }
-    next.0 = RETRY_PAUSE;
+    if next.1 >= TRIES && !shared.iter().any(SharedTerrain::is_playable) {
+        commands.trigger(ConnectionFailed(texts::unreachable(server, texts::NO_ANSWER)));
+        return;
+    }
+    (next.0, next.1) = (RETRY_PAUSE, next.1 + 1);
     let number = own.0;
     commands.queue(move |world: &mut World| {
         if let Err(why) = udp::connect(world, server, number) {
@@ -222,34 +232,45 @@ fn announce_loss(next: Option<Res<NextTry>>, mut hints: MessageWriter<Hint>) {
     }
 }
 
-fn tell_other_version(_: On<ProtocolMismatch>, mut hints: MessageWriter<Hint>) {
-    hints.write(Hint(texts::OTHER_VERSION.into()));
+fn tell_other_version(_: On<ProtocolMismatch>, mut commands: Commands) {
+    commands.trigger(ConnectionFailed(texts::OTHER_VERSION.into()));
 }
 
 /// What the host's server says about this player.
-fn follow_host(
-    mut commands: Commands,
-    mut joined: MessageReader<GroundJoined>,
-    mut party: ResMut<Party>,
-    mut hints: MessageWriter<Hint>,
-) {
+fn follow_host(mut commands: Commands, mut joined: MessageReader<GroundJoined>) {
     for message in joined.read() {
         if let ClientEvent::Kicked(why) = message.event {
-            hints.write(Hint(if why == KickReason::Ground {
-                texts::other_seed()
-            } else {
-                texts::removed(why)
-            }));
-            *party = Party::Alone;
-            commands.trigger(NewGame);
-            commands.set_state(GameState::Title);
+            let is_other = why == KickReason::Ground;
+            let why = if is_other { texts::other_seed() } else { texts::removed(why) };
+            commands.trigger(ConnectionFailed(why));
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use bevy::ecs::system::RunSystemOnce;
+
     use super::*;
+
+    #[derive(Resource, Default)]
+    struct Failures(Vec<String>);
+
+    #[test]
+    fn a_guest_gives_up_when_nobody_answers() {
+        let mut world = World::new();
+        world.init_resource::<Time<Real>>();
+        world.init_resource::<Failures>();
+        world.insert_resource(Party::Guest(([10, 0, 0, 3], PORT).into(), 0));
+        world.insert_resource(OwnNumber(7));
+        world.insert_resource(NextTry(0.0, TRIES));
+        world.add_observer(|failed: On<ConnectionFailed>, mut failures: ResMut<Failures>| {
+            failures.0.push(failed.0.clone());
+        });
+        world.run_system_once(connect).expect("a system that runs");
+        let expected = texts::unreachable("10.0.0.3:5100", texts::NO_ANSWER);
+        assert_eq!(world.resource::<Failures>().0, [expected]);
+    }
 
     #[test]
     fn addresses_may_lack_their_port() {

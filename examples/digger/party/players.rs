@@ -20,6 +20,7 @@ use crate::ui::settings::Settings;
 use crate::ui::texts;
 use crate::world::day::Clock;
 use crate::world::landscape::ORIGIN;
+use crate::world::saves::SavedPlace;
 
 /// How often players say where they are.
 const POSE_EVERY: Duration = Duration::from_millis(50);
@@ -138,10 +139,16 @@ fn tell_pose(players: Query<(&Player, Body)>, lamp: Res<HeadlampSwitch>, mut mes
     }
 }
 
-/// Ground comes from the player outwards.
-fn place_ground(players: Query<Body, With<Player>>, mut terrains: Query<&mut SharedTerrain>) {
-    for (body, mut terrain) in players.iter().zip(&mut terrains) {
-        terrain.bypass_change_detection().position = voxel(body.feet());
+/// Ground comes from the player outwards, or from where a saved game puts it.
+fn place_ground(
+    players: Query<Body, With<Player>>,
+    saved: Option<Res<SavedPlace>>,
+    mut terrains: Query<&mut SharedTerrain>,
+) {
+    let player = players.iter().next().map(|body| body.feet());
+    let Some(feet) = player.or(saved.map(|place| place.feet)) else { return };
+    for mut terrain in &mut terrains {
+        terrain.bypass_change_detection().position = voxel(feet);
     }
 }
 
@@ -244,7 +251,19 @@ fn forget_all(_: On<Remove, SharedTerrain>, mut commands: Commands) {
 
 #[cfg(test)]
 mod tests {
+    use bevy::ecs::system::RunSystemOnce;
+
     use super::*;
+
+    #[test]
+    fn the_ground_of_a_saved_game_comes_from_where_its_player_was() {
+        let mut world = World::new();
+        let terrain = world.spawn(SharedTerrain::default()).id();
+        let feet = Vec3::new(700.5, 30.0, 9.0);
+        world.insert_resource(SavedPlace { feet, yaw: 0.0, pitch: 0.0 });
+        world.run_system_once(place_ground).expect("a system that runs");
+        assert_eq!(world.get::<SharedTerrain>(terrain).expect("it is there").position, voxel(feet));
+    }
 
     #[test]
     fn names_are_short_and_visible() {

@@ -17,7 +17,7 @@ use self::game_state::GameState;
 use self::input::{Action, Actions};
 use crate::film::places::Places;
 use crate::ui::settings::Settings;
-use crate::world::landscape::{DespawnOnNewGame, NewGame};
+use crate::world::landscape::{DespawnOnNewGame, NewGame, NextGround};
 use crate::world::saves::SavedPlace;
 
 /// The player's body and the direction of its head.
@@ -45,9 +45,7 @@ pub struct PlayerPlugin;
 impl Plugin for PlayerPlugin {
     fn build(&self, app: &mut App) {
         app.configure_sets(Update, PlayerControlSystems.before(BurrowSystems::Collect))
-            .add_observer(|_: On<TerrainReady>, mut commands: Commands| {
-                commands.insert_resource(GroundIsReady)
-            })
+            .add_observer(note_ready)
             .add_observer(|_: On<NewGame>, mut commands: Commands| {
                 commands.remove_resource::<GroundIsReady>()
             })
@@ -77,6 +75,13 @@ impl Player {
 /// The terrain has loaded since the game began.
 #[derive(Resource)]
 struct GroundIsReady;
+
+/// A terrain of the world before may still become ready: it is no place for this world's player.
+fn note_ready(_: On<TerrainReady>, mut commands: Commands, next: NextGround) {
+    if !next.is_expected() {
+        commands.insert_resource(GroundIsReady);
+    }
+}
 
 /// Spawns the player where the ground is known: on shared terrain, once it has come.
 fn spawn_player(

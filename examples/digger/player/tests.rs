@@ -6,6 +6,7 @@ use bevy::time::TimeUpdateStrategy;
 
 use super::*;
 use crate::test_support::{app_with_input, hold};
+use crate::world::landscape::GroundIsWanted;
 
 /// Physics steps in which a jump was requested.
 #[derive(Resource, Default)]
@@ -34,4 +35,16 @@ fn a_tap_between_two_physics_steps_is_one_jump() {
         hold(&mut app, &[]);
     }
     assert_eq!(app.world().resource::<Jumps>().0, 1);
+}
+
+#[test]
+fn the_terrain_of_the_world_before_is_no_place_for_a_player() {
+    let mut app = App::new();
+    app.add_plugins(PlayerPlugin).insert_resource(GroundIsWanted);
+    let entity = app.world_mut().spawn_empty().id();
+    for is_ready in [false, true] {
+        app.world_mut().trigger(TerrainReady { entity });
+        assert_eq!(app.world().contains_resource::<GroundIsReady>(), is_ready);
+        app.world_mut().remove_resource::<GroundIsWanted>();
+    }
 }

@@ -8,6 +8,7 @@ use bevy::light::NotShadowCaster;
 use bevy::prelude::*;
 use bevy::time::common_conditions::on_timer;
 use bevy_burrow::prelude::*;
+use bevy_burrow::together::SharedTerrain;
 use serde::{Deserialize, Serialize};
 
 use crate::player::{Player, headlamp};
@@ -80,7 +81,7 @@ impl Plugin for LampsPlugin {
             .add_systems(
                 Update,
                 // Without a player, the ground may not have loaded.
-                (remove_loose_lamps, dim_lamps)
+                (remove_loose_lamps.after(BurrowSystems::Begin), dim_lamps)
                     .run_if(any_with_component::<Player>)
                     .run_if(on_timer(Duration::from_millis(200))),
             )
@@ -164,8 +165,20 @@ fn place(
     lamps.0.push_back(lamp.id());
 }
 
-/// Removes lamps whose ground was dug away, and buried lamps, whose light would shine through the hill.
-fn remove_loose_lamps(mut commands: Commands, terrains: Terrains, lamps: Query<(Entity, &Lamp, &Transform)>) {
+/// Removes lamps whose ground was dug away, and buried lamps, whose light would shine through the hill. While a shared
+/// world arrives, its tunnels are not dug yet.
+fn remove_loose_lamps(
+    mut commands: Commands,
+    terrains: Terrains,
+    grounds: Query<(&Terrain, Option<&SharedTerrain>)>,
+    lamps: Query<(Entity, &Lamp, &Transform)>,
+) {
+    let arrives = |(terrain, shared): (&Terrain, Option<&SharedTerrain>)| {
+        terrain.is_busy() || terrain.queued() > 0 || shared.is_some_and(|shared| !shared.has_joined())
+    };
+    if grounds.iter().any(arrives) {
+        return;
+    }
     for (entity, lamp, place) in &lamps {
         if !terrains.is_solid(lamp.root) || terrains.is_solid(place.transform_point(BULB)) {
             commands.entity(entity).despawn();
@@ -222,12 +235,19 @@ mod tests {
     }
 
     #[test]
-    fn lamps_in_the_air_or_in_the_ground_are_removed() {
+    fn lamps_in_the_air_or_in_the_ground_are_removed_but_not_while_the_ground_arrives() {
         let mut app = App::new();
         app.add_plugins((MinimalPlugins, BurrowPlugins)).init_resource::<Lamps>().add_observer(forget);
-        spawn_flat_terrain(&mut app);
+        let terrain = spawn_flat_terrain(&mut app);
         app.update();
-        for (height, stays) in [(20.0, true), (25.0, false), (12.0, false)] {
+        for (height, arrives, stays) in
+            [(20.0, false, true), (25.0, false, false), (12.0, true, true), (12.0, false, false)]
+        {
+            if arrives {
+                app.world_mut().entity_mut(terrain).insert(SharedTerrain::default());
+            } else {
+                app.world_mut().entity_mut(terrain).remove::<SharedTerrain>();
+            }
             let foot = Vec3::new(30.0, height, 30.0);
             let lamp = (Lamp { root: foot - Vec3::Y * 0.4 }, Transform::from_translation(foot));
             let lamp = app.world_mut().spawn(lamp).id();

@@ -32,6 +32,19 @@ pub fn paragraph(words: impl Into<String>, size: f32, color: Color) -> impl Bund
     )
 }
 
+/// The width of a letter as a share of its height: Bevy's font has the same for all letters.
+const LETTER: f32 = 0.6;
+
+/// The width of a line of text.
+pub fn width(words: &str, size: f32) -> f32 {
+    LETTER * size * words.chars().count() as f32
+}
+
+/// The size of a line of text: 22, or less where it would be wider than this.
+pub fn fitting(words: &str, room: f32) -> f32 {
+    22.0 * (room / width(words, 22.0)).min(1.0)
+}
+
 /// A dark box with a border.
 pub fn panel(node: Node) -> impl Bundle {
     let node = Node { border: UiRect::all(px(1)), border_radius: BorderRadius::all(px(8)), ..node };
@@ -59,6 +72,9 @@ pub fn centered() -> Node {
 pub fn column(row_gap: Val) -> Node {
     Node { flex_direction: FlexDirection::Column, row_gap, ..default() }
 }
+
+/// Seconds for which a new page ignores clicks: the second one of a double click was meant for the page before.
+const DOUBLE_CLICK: f32 = 0.4;
 
 /// Keys that activate the focused item. A gamepad's South does it too.
 pub const ACTIVATE: [KeyCode; 3] = [KeyCode::Enter, KeyCode::NumpadEnter, KeyCode::Space];
@@ -100,11 +116,11 @@ pub fn item(position: usize, node: Node) -> impl Bundle {
     (MenuItem(position), node, BackgroundColor::DEFAULT, BorderColor::all(Color::NONE))
 }
 
-/// A menu item with one line of text.
+/// A menu item with one line of text, which is smaller if it is long.
 pub fn button(position: usize, words: &str, width: f32) -> impl Bundle {
     let padding = UiRect::axes(px(18), px(9));
     let node = Node { width: px(width), padding, overflow: Overflow::clip_x(), ..default() };
-    (item(position, node), children![text(words, 22.0, WHITE)])
+    (item(position, node), children![text(words, fitting(words, width - 40.0), WHITE)])
 }
 
 /// In `Update`, when menus react to the mouse.
@@ -190,9 +206,15 @@ fn point(
     arrows: Query<(&Arrow, &Interaction, Entity), Changed<Interaction>>,
     parents: Query<&ChildOf>,
     disabled: Option<Res<MenuInputDisabled>>,
+    page: Res<State<MenuPage>>,
+    time: Res<Time<Real>>,
+    mut opened: Local<f32>,
     mut focus: ResMut<FocusedItem>,
 ) {
-    let is_enabled = disabled.is_none();
+    if page.is_changed() {
+        *opened = time.elapsed_secs();
+    }
+    let is_enabled = disabled.is_none() && time.elapsed_secs() - *opened >= DOUBLE_CLICK;
     for (entity, interaction) in &clicked {
         if *interaction == Interaction::Pressed && is_enabled {
             commands.trigger(Activated { entity });
@@ -321,5 +343,14 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn long_lines_are_smaller_and_short_ones_are_not_larger() {
+        for words in ["", "Play", "Continue Mound copy", "Continue a name of 24 letters..."] {
+            let size = fitting(words, 220.0);
+            assert!(width(words, size) < 220.1 && (10.0..=22.0).contains(&size), "{words}: {size}");
+        }
+        assert_eq!([fitting("", 220.0), fitting("Play", 220.0)], [22.0; 2]);
     }
 }

@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use bevy::asset::AssetLoadFailedEvent;
 use bevy::asset::io::embedded::EmbeddedAssetRegistry;
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, futures::check_ready};
 use bevy_burrow::ground::{GroundError, ImageSource, InsetSource, NoiseSource};
@@ -136,11 +137,25 @@ struct Heightmap(Handle<HeightmapImage>);
 
 /// The ground has to be generated.
 #[derive(Resource)]
-struct GroundIsWanted;
+pub struct GroundIsWanted;
 
 /// The task that generates the ground of a seed.
 #[derive(Resource)]
 struct Generation(Task<Result<(Arc<Ground>, Terrain, Places), String>>, u32);
+
+/// Ground of another seed than what is shown.
+#[derive(SystemParam)]
+pub struct NextGround<'w> {
+    wanted: Option<Res<'w, GroundIsWanted>>,
+    task: Option<Res<'w, Generation>>,
+}
+
+impl NextGround<'_> {
+    /// Whether there will be some.
+    pub fn is_expected(&self) -> bool {
+        self.wanted.is_some() || self.task.is_some()
+    }
+}
 
 /// Spawns the terrain's entity with its look before there is a terrain, so that the textures are made meanwhile.
 fn load_heightmap(mut commands: Commands, assets: Res<AssetServer>) {

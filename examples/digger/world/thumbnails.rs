@@ -35,10 +35,7 @@ fn take(
     party: Res<Party>,
     windows: Query<(), With<PrimaryWindow>>,
 ) {
-    if matches!(*party, Party::Guest(..)) {
-        return;
-    }
-    let Some(folder) = played.0.clone().filter(|_| !windows.is_empty()) else { return };
+    let Some(folder) = played.open(&party).cloned().filter(|_| !windows.is_empty()) else { return };
     commands.spawn(Screenshot::primary_window()).observe(move |picture: On<ScreenshotCaptured>| {
         let (picture, folder) = (picture.image.clone(), folder.clone());
         let write = move || {

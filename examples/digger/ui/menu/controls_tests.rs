@@ -6,26 +6,12 @@ use bevy::input::mouse::MouseScrollUnit;
 
 use super::*;
 use crate::test_support::{scroll, send_button, tap_key};
-use crate::ui::menu::item_at;
+use crate::ui::menu::click;
 
 const LEFT: Binding = Binding::Mouse(MouseButton::Left);
 
 fn app() -> App {
     crate::ui::menu::app_with(ControlsPlugin, MenuPage::Controls)
-}
-
-/// Clicks an item as Bevy sees it: it is pressed in the frame in which the button goes down.
-fn click(app: &mut App, position: usize) {
-    let item = item_at(app, position);
-    send_button(app, MouseButton::Left, ButtonState::Pressed);
-    app.world_mut().entity_mut(item).insert(Interaction::Pressed);
-    app.update();
-    send_button(app, MouseButton::Left, ButtonState::Released);
-    if let Ok(mut item) = app.world_mut().get_entity_mut(item) {
-        item.insert(Interaction::Hovered);
-    }
-    app.update();
-    app.update();
 }
 
 fn click_action(app: &mut App, action: Action) {

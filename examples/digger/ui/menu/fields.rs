@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use crate::party::players::MAX_LETTERS;
 use crate::player::game_state::MenuPage;
 use crate::ui::settings::Settings;
-use crate::ui::widgets::{self, Activated, GOLD, MenuInputDisabled, WHITE, text};
+use crate::ui::widgets::{self, Activated, GOLD, MenuInputDisabled, MenuPointerSystems, WHITE, text};
 
 /// Lets the player type.
 pub struct FieldsPlugin;
@@ -15,8 +15,11 @@ pub struct FieldsPlugin;
 impl Plugin for FieldsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Draft>()
-            // After the key that activated a field.
-            .add_systems(Update, (write, show).chain().run_if(not(in_state(MenuPage::None))))
+            // After the key that activated a field, and before the click that ends typing chooses another item.
+            .add_systems(
+                Update,
+                (write, show).chain().before(MenuPointerSystems).run_if(not(in_state(MenuPage::None))),
+            )
             .add_systems(StateTransition, stop_writing.run_if(state_changed::<MenuPage>));
     }
 }
@@ -67,6 +70,10 @@ impl Field {
 #[derive(Resource, Clone)]
 struct Writing(Field, String);
 
+/// The width that a field's text may have. A long text is smaller.
+#[derive(Component)]
+struct Room(f32);
+
 /// A row with a text that can be typed.
 pub fn spawn_field(column: &mut ChildSpawnerCommands, at: usize, label: &str, field: Field, width: f32) {
     let row = Node {
@@ -75,7 +82,8 @@ pub fn spawn_field(column: &mut ChildSpawnerCommands, at: usize, label: &str, fi
         justify_content: JustifyContent::SpaceBetween,
         ..default()
     };
-    let texts = children![text(label, 22.0, WHITE), (field, text("", 22.0, GOLD))];
+    let room = Room(width - 60.0 - widgets::width(label, 22.0));
+    let texts = children![text(label, 22.0, WHITE), (field, room, text("", 22.0, GOLD))];
     column.spawn((widgets::item(at, row), texts)).observe(
         move |_: On<Activated>, mut commands: Commands, settings: Res<Settings>, draft: Res<Draft>| {
             commands.insert_resource(Writing(field, field.of(&settings, &draft)));
@@ -135,15 +143,16 @@ fn show(
     settings: Res<Settings>,
     draft: Res<Draft>,
     writing: Option<Res<Writing>>,
-    mut fields: Query<(&Field, &mut Text, &mut TextColor)>,
+    mut fields: Query<(&Field, &Room, &mut Text, &mut TextFont, &mut TextColor)>,
 ) {
-    for (field, mut text, mut color) in &mut fields {
+    for (field, room, mut text, mut font, mut color) in &mut fields {
         let is_written = writing.as_ref().is_some_and(|writing| writing.0 == *field);
         let words = match field.of(&settings, &draft) {
             words if is_written => format!("{words}_"),
             words if words.is_empty() => "...".into(),
             words => words,
         };
+        font.set_if_neq(TextFont::from_font_size(widgets::fitting(&words, room.0)));
         text.set_if_neq(Text::new(words));
         color.set_if_neq(TextColor(if is_written { WHITE } else { GOLD }));
     }

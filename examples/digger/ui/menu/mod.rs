@@ -99,11 +99,13 @@ fn quit(_: On<Activated>, mut exit: MessageWriter<AppExit>) {
     exit.write(AppExit::Success);
 }
 
-/// An app with an open page, for tests.
+/// An app with an open page, for tests. Its frames are long, so that a click is never the second one of two.
 #[cfg(test)]
 fn app_with(plugin: impl Plugin, page: MenuPage) -> App {
     let mut app = crate::test_support::app_with_input();
-    app.init_state::<MenuPage>()
+    let frame = bevy::time::TimeUpdateStrategy::ManualDuration(std::time::Duration::from_millis(500));
+    app.insert_resource(frame)
+        .init_state::<MenuPage>()
         .init_state::<GameState>()
         .init_resource::<crate::ui::settings::DefaultSettings>()
         .init_resource::<UiScale>()
@@ -117,6 +119,24 @@ fn app_with(plugin: impl Plugin, page: MenuPage) -> App {
 fn item_at(app: &mut App, position: usize) -> Entity {
     let mut items = app.world_mut().query::<(Entity, &widgets::MenuItem)>();
     items.iter(app.world()).find(|(_, item)| item.0 == position).map(|(entity, _)| entity).expect("an item")
+}
+
+/// Clicks an item as Bevy sees it, for tests: it is pressed in the frame in which the button goes down.
+#[cfg(test)]
+fn click(app: &mut App, position: usize) {
+    use bevy::input::ButtonState;
+
+    use crate::test_support::send_button;
+    let item = item_at(app, position);
+    send_button(app, MouseButton::Left, ButtonState::Pressed);
+    app.world_mut().entity_mut(item).insert(Interaction::Pressed);
+    app.update();
+    send_button(app, MouseButton::Left, ButtonState::Released);
+    if let Ok(mut item) = app.world_mut().get_entity_mut(item) {
+        item.insert(Interaction::Hovered);
+    }
+    app.update();
+    app.update();
 }
 
 /// The items and texts of the open page, for tests.

@@ -57,7 +57,9 @@ fn open(mut commands: Commands, question: Option<Res<Question>>) {
     };
     spawn_page(&mut commands, MenuPage::Question, title, WIDTH + 54.0, |column| {
         let line = Node { width: px(WIDTH), margin: UiRect::bottom(px(14)), ..default() };
-        column.spawn((widgets::paragraph(&question.text, 18.0, WHITE), line));
+        // Paths may be longer than a line.
+        let layout = TextLayout::linebreak(LineBreak::WordOrCharacter);
+        column.spawn((widgets::paragraph(&question.text, 18.0, WHITE), layout, line));
         column.spawn(widgets::button(0, back, WIDTH)).observe(super::go_to(question.back));
         let Some((yes, action)) = question.yes else { return };
         column.spawn(widgets::button(1, yes, WIDTH)).observe(

@@ -17,7 +17,7 @@ use crate::ui::images::Images;
 use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, GOLD, GREY};
 use crate::world::landscape::NewGame;
-use crate::world::saves::{self, PlayedWorld};
+use crate::world::saves::{self, PlayedWorld, WorldsFolder};
 
 /// Seconds for one turn around the landscape.
 const TURN: f32 = 150.0;
@@ -30,9 +30,13 @@ pub struct TitlePlugin;
 impl Plugin for TitlePlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<Start>()
-            .add_systems(OnEnter(GameState::Title), |mut page: ResMut<NextState<MenuPage>>| {
-                page.set(MenuPage::Menu);
-            })
+            .add_observer(|_: On<NewGame>, mut game: ResMut<Start>| game.has_begun = false)
+            .add_systems(
+                OnEnter(GameState::Title),
+                // What ended the game may be told.
+                (|mut page: ResMut<NextState<MenuPage>>| page.set(MenuPage::Menu))
+                    .run_if(not(in_state(MenuPage::Question))),
+            )
             .add_systems(OnEnter(MenuPage::Menu), open.run_if(in_state(GameState::Title)))
             .add_systems(OnEnter(GameState::Playing), (attach_camera, note_start))
             .add_systems(
@@ -70,6 +74,7 @@ fn open(
     mut commands: Commands,
     images: Option<Res<Images>>,
     game: Res<Start>,
+    worlds: Res<WorldsFolder>,
     played: Res<PlayedWorld>,
     party: Res<Party>,
 ) {
@@ -90,11 +95,10 @@ fn open(
         left.spawn((ImageNode::new(images.logo.clone()), logo));
         let below = Node { margin: UiRect::bottom(px(34)), ..default() };
         left.spawn((widgets::text(texts::TAGLINE, 17.0, GREY), below));
-        let saves_worlds = saves::new_name().is_some();
-        let saved = played.0.as_deref().filter(|_| !matches!(*party, Party::Guest(..)));
-        let first = match saved {
+        let saves_worlds = worlds.0.is_some();
+        let first = match played.open(&party) {
             Some(folder) => texts::continue_world(&saves::name(folder)),
-            None if game.has_begun && (!saves_worlds || *party != Party::Alone) => texts::CONTINUE.into(),
+            None if game.has_begun => texts::CONTINUE.into(),
             None => texts::PLAY.into(),
         };
         left.spawn(widgets::button(0, &first, WIDTH)).observe(start);
@@ -131,25 +135,19 @@ fn start(
     _: On<Activated>,
     mut commands: Commands,
     mut game: ResMut<Start>,
-    mut played: ResMut<PlayedWorld>,
+    played: Res<PlayedWorld>,
     party: Res<Party>,
 ) {
-    game.is_wanted = true;
-    if played.0.is_none() && *party == Party::Alone {
-        played.0 = saves::new_name().and_then(|name| saves::create(&name, 0).ok());
-        if played.0.is_some() {
-            worlds::begin(&mut commands, &mut game);
-        }
+    if game.has_begun || played.0.is_some() || matches!(*party, Party::Guest(..)) {
+        game.is_wanted = true;
+    } else {
+        worlds::begin(&mut commands, Party::clone(&party));
     }
 }
 
 /// Where nothing is saved, a new game loses the old one.
 fn ask_for_new_game(_: On<Activated>, mut commands: Commands) {
-    let begin = |commands: &mut Commands| {
-        commands.insert_resource(Party::Alone);
-        commands.trigger(NewGame);
-        commands.queue(|world: &mut World| world.resource_mut::<Start>().is_wanted = true);
-    };
+    let begin = |commands: &mut Commands| worlds::begin_as_is(commands, Party::Alone);
     question::ask(&mut commands, MenuPage::Menu, texts::NEW_UNSAVED, texts::NEW_WORLD, begin);
 }
 

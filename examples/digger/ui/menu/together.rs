@@ -5,14 +5,13 @@ use std::net::SocketAddr;
 use bevy::prelude::*;
 
 use super::fields::{Field, spawn_field};
-use super::title::Start;
 use super::{spawn_back, spawn_page, worlds};
 use crate::party::connection::{Address, NoAddress, PORT, Party, own_address};
 use crate::player::game_state::MenuPage;
 use crate::ui::settings::Settings;
 use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, GREY, RED};
-use crate::world::saves::{self, PlayedWorld};
+use crate::world::saves::{self, PlayedWorld, WorldsFolder};
 
 /// Width of the rows.
 const WIDTH: f32 = 520.0;
@@ -30,7 +29,7 @@ impl Plugin for TogetherPagePlugin {
 #[derive(Component)]
 struct Note;
 
-fn open(mut commands: Commands, party: Res<Party>, played: Res<PlayedWorld>) {
+fn open(mut commands: Commands, party: Res<Party>, worlds: Res<WorldsFolder>, played: Res<PlayedWorld>) {
     spawn_page(&mut commands, MenuPage::Together, texts::MULTIPLAYER, WIDTH + 54.0, |column| {
         spawn_field(column, 0, texts::YOUR_NAME, Field::PlayerName, WIDTH);
         let port = if let Party::Host(port) = *party { port } else { PORT };
@@ -46,7 +45,11 @@ fn open(mut commands: Commands, party: Res<Party>, played: Res<PlayedWorld>) {
         spawn_field(column, 2, texts::HOST_ADDRESS, Field::Address, WIDTH);
         column.spawn(widgets::button(3, texts::JOIN, WIDTH)).observe(join);
         let line = Node { width: px(WIDTH - 28.0), margin: UiRect::axes(px(14), px(8)), ..default() };
-        let is_saved = saves::new_name().is_some() || matches!(*party, Party::Guest(..));
+        let is_saved = match *party {
+            Party::Alone => worlds.0.is_some(),
+            Party::Host(_) => played.0.is_some(),
+            Party::Guest(..) => true,
+        };
         let saved = if is_saved { "" } else { texts::NOT_SAVED };
         column.spawn((Note, widgets::paragraph(format!("{note}{saved}"), 15.0, GREY), line));
         spawn_back(column, 4, WIDTH, MenuPage::Together);
@@ -54,35 +57,19 @@ fn open(mut commands: Commands, party: Res<Party>, played: Res<PlayedWorld>) {
 }
 
 /// Hosts the world that is played; a host or a guest plays alone again.
-fn change_host(
-    _: On<Activated>,
-    mut commands: Commands,
-    mut party: ResMut<Party>,
-    mut played: ResMut<PlayedWorld>,
-    mut start: ResMut<Start>,
-) {
-    *party = if *party == Party::Alone { Party::Host(PORT) } else { Party::Alone };
-    // A hosted world is saved, also if no world was played yet.
-    if *party != Party::Alone && played.0.is_none() {
-        played.0 = saves::new_name().and_then(|name| saves::create(&name, 0).ok());
-    }
-    worlds::begin(&mut commands, &mut start);
+fn change_host(_: On<Activated>, mut commands: Commands, party: Res<Party>) {
+    worlds::begin(&mut commands, if *party == Party::Alone { Party::Host(PORT) } else { Party::Alone });
 }
 
 fn join(
     _: On<Activated>,
     mut commands: Commands,
     settings: Res<Settings>,
-    mut party: ResMut<Party>,
-    mut start: ResMut<Start>,
     mut note: Query<(&mut Text, &mut TextColor), With<Note>>,
 ) {
     let address: Result<Address, NoAddress> = settings.host_address.parse();
     match address {
-        Ok(Address(host, seed)) => {
-            *party = Party::Guest(host, seed);
-            worlds::begin(&mut commands, &mut start);
-        }
+        Ok(Address(host, seed)) => worlds::begin(&mut commands, Party::Guest(host, seed)),
         Err(why) => {
             for (mut text, mut color) in &mut note {
                 *text = Text::new(why.to_string());
@@ -100,14 +87,17 @@ mod tests {
     use super::*;
     use crate::party::players::MAX_LETTERS;
     use crate::test_support::tap_key;
-    use crate::ui::menu::item_at;
+    use crate::ui::menu::title::Start;
+    use crate::ui::menu::{click, item_at, words};
     use crate::ui::widgets::MenuInputDisabled;
 
+    /// On a machine without a folder for data.
     fn app() -> App {
         let plugin = |app: &mut App| {
             app.init_resource::<Party>()
                 .init_resource::<Start>()
                 .init_resource::<PlayedWorld>()
+                .init_resource::<WorldsFolder>()
                 .add_plugins(TogetherPagePlugin);
         };
         crate::ui::menu::app_with(plugin, MenuPage::Together)
@@ -168,5 +158,46 @@ mod tests {
         app.world_mut().resource_mut::<Settings>().host_address = "10.0.0.3".into();
         activate(&mut app, 3);
         assert_eq!(*app.world().resource::<Party>(), Party::Guest(([10, 0, 0, 3], PORT).into(), 0));
+    }
+
+    #[test]
+    fn a_click_that_ends_typing_also_chooses_another_item() {
+        let mut app = app();
+        activate(&mut app, 0);
+        write_text(&mut app, "Ann");
+        click(&mut app, 4);
+        assert_eq!(app.world().resource::<Settings>().name, "Ann");
+        assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Menu);
+    }
+
+    #[test]
+    fn a_world_that_cannot_be_saved_is_hosted_or_played_after_a_question_only() {
+        let guest = Party::Guest(([10, 0, 0, 3], PORT).into(), 0);
+        for (before, after) in [(Party::Alone, Party::Host(PORT)), (guest, Party::Alone)] {
+            let mut app = app();
+            app.insert_resource(before.clone());
+            click(&mut app, 1);
+            assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Question);
+            assert!(words(&mut app).contains(&texts::nothing_saved(texts::NO_FOLDER)));
+            assert_eq!(*app.world().resource::<Party>(), before);
+            assert!(!app.world().resource::<Start>().is_wanted);
+            click(&mut app, 1);
+            assert_eq!(*app.world().resource::<Party>(), after);
+            assert!(app.world().resource::<Start>().is_wanted);
+        }
+    }
+
+    #[test]
+    fn who_leaves_a_host_plays_a_world_that_is_saved() {
+        let all = std::env::temp_dir().join(format!("digger_leave_{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&all);
+        let mut app = app();
+        app.insert_resource(WorldsFolder(Some(all.clone())))
+            .insert_resource(Party::Guest(([10, 0, 0, 3], PORT).into(), 0));
+        click(&mut app, 1);
+        assert_eq!(*app.world().resource::<Party>(), Party::Alone);
+        assert_eq!(app.world().resource::<PlayedWorld>().0, Some(all.join("world 1")));
+        assert!(app.world().resource::<Start>().is_wanted);
+        std::fs::remove_dir_all(&all).expect("removed");
     }
 }

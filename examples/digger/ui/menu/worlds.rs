@@ -5,19 +5,20 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use bevy::prelude::*;
+use bevy::tasks::{IoTaskPool, Task, futures::check_ready};
 use bevy::window::PrimaryWindow;
 
 use super::fields::{Draft, Field, spawn_field};
 use super::question;
 use super::title::Start;
 use super::{spawn_back, spawn_page};
-use crate::party::connection::Party;
+use crate::party::connection::{ConnectionFailed, Party};
 use crate::player::game_state::{GameState, MenuPage};
 use crate::ui::hud::Hint;
 use crate::ui::texts;
-use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GREY, WHITE};
+use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GREY, MenuInputDisabled, WHITE};
 use crate::world::landscape::NewGame;
-use crate::world::saves::{self, FoundWorld, NotOpened, PlayedWorld};
+use crate::world::saves::{self, FoundWorld, NotOpened, PlayedWorld, WorldsFolder};
 use crate::world::thumbnails;
 
 /// Width of the buttons.
@@ -36,6 +37,9 @@ impl Plugin for WorldsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<FirstShown>()
             .add_observer(refuse)
+            .add_observer(|failed: On<ConnectionFailed>, mut commands: Commands| {
+                give_up(&mut commands, failed.0.clone());
+            })
             .add_systems(OnEnter(MenuPage::Worlds), open)
             .add_systems(OnEnter(MenuPage::World), open_world.run_if(resource_exists::<Chosen>))
             .add_systems(OnExit(MenuPage::World), rename)
@@ -52,12 +56,21 @@ struct FirstShown(usize);
 #[derive(Resource)]
 struct Chosen(PathBuf);
 
-/// The action on a world as soon as it is closed.
-#[derive(Resource, Clone, Debug)]
-enum Change {
-    Delete(PathBuf),
-    Duplicate(PathBuf),
+/// A world that is copied or deleted as soon as it is closed. Menus ignore input until then.
+#[derive(Resource, Default)]
+struct Change {
+    folder: PathBuf,
+    /// The name that the copy gets; `None` if the world is deleted.
+    copy: Option<String>,
+    /// Whether it is the world that is played.
+    is_played: bool,
+    waited: Duration,
+    task: Option<Task<io::Result<()>>>,
 }
+
+/// A text while a world is changed.
+#[derive(Component)]
+struct Wait;
 
 /// Plays no world that can't be saved, and says why. A script, which nobody watches, continues
 /// without saving.
@@ -65,8 +78,6 @@ fn refuse(
     not_opened: On<NotOpened>,
     mut commands: Commands,
     mut played: ResMut<PlayedWorld>,
-    mut party: ResMut<Party>,
-    mut start: ResMut<Start>,
     mut hints: MessageWriter<Hint>,
     windows: Query<(), With<PrimaryWindow>>,
 ) {
@@ -75,23 +86,33 @@ fn refuse(
         hints.write(Hint(texts::nothing_saved(why)));
         return;
     };
-    (played.0, *party, start.is_wanted) = (None, Party::Alone, false);
-    commands.trigger(NewGame);
+    played.0 = None;
     let text = match saves::is_closed(&folder) {
         true => texts::not_opened(&saves::name(&folder), why),
         false => texts::is_open(&saves::name(&folder)),
     };
-    question::tell(&mut commands, MenuPage::Menu, text);
+    give_up(&mut commands, text);
+}
+
+/// Leads to the title, where the player reads why, and plays alone again.
+fn give_up(commands: &mut Commands, why: String) {
+    commands.insert_resource(Party::Alone);
+    commands.queue(|world: &mut World| world.resource_mut::<Start>().is_wanted = false);
+    commands.trigger(NewGame);
+    commands.set_state_if_neq(GameState::Title);
+    question::tell(commands, MenuPage::Menu, why);
 }
 
 fn open(
     mut commands: Commands,
+    folder: Res<WorldsFolder>,
     played: Res<PlayedWorld>,
+    party: Res<Party>,
     mut first: ResMut<FirstShown>,
     mut images: ResMut<Assets<Image>>,
 ) {
-    let worlds = saves::worlds();
-    let (played, all) = (played.0.clone(), worlds.len());
+    let worlds = folder.worlds();
+    let (played, all) = (played.open(&party).cloned(), worlds.len());
     if first.0 >= all {
         first.0 = 0;
     }
@@ -169,8 +190,9 @@ fn open_world(mut commands: Commands, chosen: Res<Chosen>, mut draft: ResMut<Dra
             .observe(move |_: On<Activated>, mut commands: Commands| play(&mut commands, folder.clone()));
         let folder = chosen.0.clone();
         column.spawn(widgets::button(2, texts::DUPLICATE, WIDTH)).observe(
-            move |_: On<Activated>, mut commands: Commands| {
-                commands.insert_resource(Change::Duplicate(folder.clone()));
+            move |_: On<Activated>, mut commands: Commands, draft: Res<Draft>| {
+                let copy = Some(draft.name.clone());
+                commands.insert_resource(Change { folder: folder.clone(), copy, ..default() });
             },
         );
         let folder = chosen.0.clone();
@@ -178,71 +200,102 @@ fn open_world(mut commands: Commands, chosen: Res<Chosen>, mut draft: ResMut<Dra
             move |_: On<Activated>, mut commands: Commands, draft: Res<Draft>| {
                 let folder = folder.clone();
                 let delete = move |commands: &mut Commands| {
-                    commands.insert_resource(Change::Delete(folder.clone()));
+                    commands.insert_resource(Change { folder: folder.clone(), ..default() });
                 };
                 let text = texts::delete_world(&draft.name);
                 question::ask(&mut commands, MenuPage::World, text, texts::DELETE, delete);
             },
         );
         spawn_back(column, 4, WIDTH, MenuPage::World);
+        let line = Node { margin: UiRect::axes(px(14), px(4)), ..default() };
+        column.spawn((Wait, widgets::text("", 14.0, GREY), line));
     });
 }
 
-fn rename(chosen: Option<Res<Chosen>>, draft: Res<Draft>, played: Res<PlayedWorld>, mut commands: Commands) {
+fn rename(
+    chosen: Option<Res<Chosen>>,
+    draft: Res<Draft>,
+    played: Res<PlayedWorld>,
+    party: Res<Party>,
+    mut commands: Commands,
+) {
     let Some(folder) = chosen.map(|chosen| chosen.0.clone()).filter(|folder| folder.exists()) else { return };
     let name = saves::name(&folder);
     if draft.name == name {
         return;
     }
-    if played.0.as_ref() != Some(&folder) && !saves::is_closed(&folder) {
+    if played.open(&party) != Some(&folder) && !saves::is_closed(&folder) {
         question::tell(&mut commands, MenuPage::Worlds, texts::is_open(&name));
     } else if let Err(why) = saves::rename(&folder, &draft.name) {
         question::tell(&mut commands, MenuPage::Worlds, texts::failed(texts::WORLD_NAME, why));
     }
 }
 
-/// Closes the world if it is open, and changes it once that is done. One that stays open is somebody else's.
+/// Closes the world if it is open, and changes it once that is done. One that stays open is somebody else's. If it was
+/// played, it is played on, or the latest one if it is gone.
 fn change(
     mut commands: Commands,
-    change: Res<Change>,
+    change: ResMut<Change>,
     time: Res<Time<Real>>,
-    mut waited: Local<Duration>,
+    worlds: Res<WorldsFolder>,
     mut played: ResMut<PlayedWorld>,
+    mut party: ResMut<Party>,
+    mut notes: Query<&mut Text, With<Wait>>,
 ) {
-    let (Change::Delete(folder) | Change::Duplicate(folder)) = &*change;
-    if change.is_added() {
-        *waited = Duration::ZERO;
+    let is_new = change.is_added();
+    let change = change.into_inner();
+    let is_open = played.open(&party) == Some(&change.folder);
+    if is_new {
+        commands.insert_resource(MenuInputDisabled);
+        change.is_played = played.0.as_ref() == Some(&change.folder);
     }
-    if played.0.as_ref() == Some(folder) {
-        played.0 = None;
+    if is_open {
+        (played.0, *party) = (None, Party::Alone);
         commands.trigger(NewGame);
         return;
     }
-    if !saves::is_closed(folder) {
-        *waited += time.delta();
-        if *waited > CLOSING {
-            commands.remove_resource::<Change>();
-            question::tell(&mut commands, MenuPage::Worlds, texts::is_open(&saves::name(folder)));
-        }
-        return;
+    for mut note in &mut notes {
+        note.set_if_neq(Text::new(texts::WAIT));
     }
-    let done: io::Result<()> = match &*change {
-        Change::Delete(folder) => std::fs::remove_dir_all(folder),
-        Change::Duplicate(folder) => saves::duplicate(folder),
+    let done = match &mut change.task {
+        Some(task) => match check_ready(task) {
+            Some(done) => done.map_err(|why| texts::failed(&change.folder.display().to_string(), why)),
+            None => return,
+        },
+        None if saves::is_closed(&change.folder) => {
+            let (folder, copy) = (change.folder.clone(), change.copy.clone());
+            change.task = Some(IoTaskPool::get().spawn(async move {
+                match copy {
+                    Some(name) => saves::duplicate(&folder, &name),
+                    None => std::fs::remove_dir_all(&folder),
+                }
+            }));
+            return;
+        }
+        None if change.waited < CLOSING => {
+            change.waited += time.delta();
+            return;
+        }
+        None => Err(texts::is_open(&saves::name(&change.folder))),
     };
     commands.remove_resource::<Change>();
+    commands.remove_resource::<MenuInputDisabled>();
+    if change.is_played {
+        let kept = Some(change.folder.clone()).filter(|folder| folder.exists());
+        played.0 = kept.or_else(|| worlds.latest());
+        if played.open(&party).is_some() {
+            commands.trigger(NewGame);
+        }
+    }
     match done {
         Ok(()) => commands.set_state(MenuPage::Worlds),
-        Err(why) => {
-            let text = texts::failed(&folder.display().to_string(), why);
-            question::tell(&mut commands, MenuPage::Worlds, text);
-        }
+        Err(why) => question::tell(&mut commands, MenuPage::Worlds, why),
     }
 }
 
-fn open_new(mut commands: Commands, mut draft: ResMut<Draft>) {
+fn open_new(mut commands: Commands, worlds: Res<WorldsFolder>, mut draft: ResMut<Draft>) {
     *draft =
-        Draft { name: saves::new_name().unwrap_or_default(), seed: fastrand::u32(1..1_000_000).to_string() };
+        Draft { name: worlds.new_name().unwrap_or_default(), seed: fastrand::u32(1..1_000_000).to_string() };
     spawn_page(&mut commands, MenuPage::NewWorld, texts::NEW_WORLD, WIDTH + 54.0, |column| {
         spawn_field(column, 0, texts::WORLD_NAME, Field::WorldName, WIDTH);
         spawn_field(column, 1, texts::SEED, Field::Seed, WIDTH);
@@ -253,8 +306,8 @@ fn open_new(mut commands: Commands, mut draft: ResMut<Draft>) {
     });
 }
 
-fn create(_: On<Activated>, mut commands: Commands, draft: Res<Draft>) {
-    match saves::create(&draft.name, draft.seed.parse().unwrap_or_default()) {
+fn create(_: On<Activated>, mut commands: Commands, worlds: Res<WorldsFolder>, draft: Res<Draft>) {
+    match worlds.create(&draft.name, draft.seed.parse().unwrap_or_default()) {
         Ok(folder) => play(&mut commands, folder),
         Err(why) => {
             question::tell(&mut commands, MenuPage::NewWorld, texts::failed(texts::CREATE, why));
@@ -265,123 +318,41 @@ fn create(_: On<Activated>, mut commands: Commands, draft: Res<Draft>) {
 /// Plays a saved world alone.
 fn play(commands: &mut Commands, folder: PathBuf) {
     commands.insert_resource(PlayedWorld(Some(folder)));
-    commands.insert_resource(Party::Alone);
-    commands.queue(|world: &mut World| {
-        world.resource_scope(|world, mut start: Mut<Start>| begin(&mut world.commands(), &mut start));
+    begin(commands, Party::Alone);
+}
+
+/// Plays the world that is set, with this party. Where none is set, a new one is made, so that all that is played is
+/// saved; if that fails, the player is asked.
+pub fn begin(commands: &mut Commands, party: Party) {
+    commands.queue(move |world: &mut World| {
+        let mut made = Ok(());
+        if world.resource::<PlayedWorld>().0.is_none() && !matches!(party, Party::Guest(..)) {
+            let new = world.resource::<WorldsFolder>().create_next();
+            made = new.map(|folder| world.resource_mut::<PlayedWorld>().0 = Some(folder));
+        }
+        let page = **world.resource::<State<MenuPage>>();
+        let mut commands = world.commands();
+        match made {
+            Ok(()) => begin_as_is(&mut commands, party),
+            Err(why) => {
+                let begin = move |commands: &mut Commands| begin_as_is(commands, party.clone());
+                let text = texts::nothing_saved(why);
+                question::ask(&mut commands, page, text, texts::PLAY_UNSAVED, begin);
+            }
+        }
     });
 }
 
-/// Plays the world that is set now, with the party that is set, as soon as it has loaded.
-pub fn begin(commands: &mut Commands, start: &mut Start) {
-    commands.trigger(NewGame);
-    start.is_wanted = true;
+/// Plays what is set, saved or not, as soon as it has loaded.
+pub fn begin_as_is(commands: &mut Commands, party: Party) {
+    commands.insert_resource(party);
+    commands.queue(|world: &mut World| world.resource_mut::<Start>().is_wanted = true);
     commands.set_state_if_neq(GameState::Title);
     commands.set_state(MenuPage::Menu);
+    // Last, because hosting may fail at once.
+    commands.trigger(NewGame);
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::test_support::go_to;
-    use crate::ui::menu::title::TitlePlugin;
-    use crate::ui::menu::{app_with, item_at, words};
-
-    fn app(page: MenuPage) -> App {
-        let plugin = |app: &mut App| {
-            app.init_resource::<Assets<Image>>()
-                .init_resource::<bevy_burrow::view::GroundLoading>()
-                .init_resource::<PlayedWorld>()
-                .init_resource::<Party>()
-                .add_message::<Hint>()
-                .add_plugins((WorldsPlugin, TitlePlugin));
-        };
-        app_with(plugin, page)
-    }
-
-    #[test]
-    fn a_world_that_was_chosen_starts_from_the_title_and_from_the_pause() {
-        for state in [GameState::Title, GameState::Paused] {
-            let mut app = app(MenuPage::Menu);
-            go_to(&mut app, state);
-            let folder = PathBuf::from("no such world");
-            play(&mut app.world_mut().commands(), folder.clone());
-            app.world_mut().flush();
-            app.update();
-            app.update();
-            assert!(app.world().resource::<Start>().is_wanted, "from {state:?}");
-            assert_eq!(app.world().resource::<PlayedWorld>().0, Some(folder));
-            assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Menu);
-            assert_eq!(**app.world().resource::<State<GameState>>(), GameState::Title);
-        }
-    }
-
-    #[test]
-    fn a_world_that_is_open_in_another_window_is_neither_played_renamed_nor_deleted() {
-        let folder = std::env::temp_dir().join(format!("digger_elsewhere_{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        let lock = std::fs::File::create(folder.join("lock")).expect("a file");
-        lock.try_lock().expect("free");
-        let text = texts::is_open(&saves::name(&folder));
-        let mut app = app(MenuPage::Menu);
-        app.world_mut().spawn((Window::default(), PrimaryWindow));
-        app.insert_resource(Chosen(folder.clone()));
-        let is_told = |app: &mut App| {
-            app.update();
-            app.update();
-            assert_eq!(**app.world().resource::<State<MenuPage>>(), MenuPage::Question);
-            assert!(words(app).contains(&text), "{:?}", words(app));
-        };
-
-        play(&mut app.world_mut().commands(), folder.clone());
-        app.update();
-        app.world_mut().trigger(NotOpened("it is open".into()));
-        is_told(&mut app);
-        assert_eq!(*app.world().resource::<PlayedWorld>(), PlayedWorld(None), "nothing is written to it");
-        assert!(!app.world().resource::<Start>().is_wanted);
-
-        go_to(&mut app, MenuPage::World);
-        app.world_mut().resource_mut::<Draft>().name = "mine".into();
-        go_to(&mut app, MenuPage::Worlds);
-        is_told(&mut app);
-        assert_ne!(saves::name(&folder), "mine");
-
-        go_to(&mut app, MenuPage::Worlds);
-        app.insert_resource(Change::Delete(folder.clone()));
-        app.update();
-        app.world_mut().resource_mut::<Time<Real>>().advance_by(CLOSING * 2);
-        app.world_mut().run_system_cached(change).expect("it runs");
-        is_told(&mut app);
-        assert!(folder.exists() && !app.world().contains_resource::<Change>());
-        std::fs::remove_dir_all(&folder).expect("removed");
-    }
-
-    #[test]
-    fn a_world_is_deleted_only_after_the_answer_and_once_it_is_closed() {
-        let folder = std::env::temp_dir().join(format!("digger_delete_{}", std::process::id()));
-        std::fs::create_dir_all(&folder).expect("a folder");
-        let mut app = app(MenuPage::Worlds);
-        app.insert_resource(Chosen(folder.clone()));
-        let activate = |app: &mut App, at: usize| {
-            let entity = item_at(app, at);
-            app.world_mut().trigger(Activated { entity });
-            app.update();
-            app.update();
-        };
-        let page = |app: &App| **app.world().resource::<State<MenuPage>>();
-        go_to(&mut app, MenuPage::World);
-        activate(&mut app, 3);
-        assert_eq!(page(&app), MenuPage::Question);
-        assert!(words(&mut app).iter().any(|text| text.contains("digger_delete")));
-        activate(&mut app, 0);
-        assert_eq!((page(&app), folder.exists()), (MenuPage::World, true), "cancelled");
-        let lock = std::fs::File::create(folder.join("lock")).expect("a file");
-        lock.try_lock().expect("free");
-        activate(&mut app, 3);
-        activate(&mut app, 1);
-        assert!(folder.exists(), "it is open");
-        drop(lock);
-        app.update();
-        app.update();
-        assert_eq!((page(&app), folder.exists()), (MenuPage::Worlds, false));
-    }
-}
+#[path = "worlds_tests.rs"]
+mod tests;
