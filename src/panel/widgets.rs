@@ -10,7 +10,7 @@ use bevy_egui::egui::{
 };
 
 use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
-use super::{PanelPlaces, texts};
+use super::PanelPlaces;
 
 /// Positions of the widgets drawn in this frame.
 #[derive(Clone, Default)]

@@ -373,7 +373,7 @@ mod tests {
             let own = QuantizedPath::quantize(&path).expect("valid");
             let pieces: Vec<RoundCone> =
                 own.segments().into_iter().map(|[from, to]| RoundCone::new(from, to)).collect();
-            let corners = corners.map(|(x, z)| DVec3::new(x, 0.0, z));
+            let corners = corners.map(|(x, z)| DVec3::new(f64::from(x), 0.0, f64::from(z)));
             for span in 0..3_usize {
                 let at = |index: usize| corners[index.min(3)];
                 let [a, b, c, d] = [at(span.saturating_sub(1)), at(span), at(span + 1), at(span + 2)];
