@@ -180,6 +180,7 @@ pub(crate) struct ThreadTask<T: Send + 'static> {
     _wanted: Arc<()>,
 }
 
+#[allow(dead_code, reason = "which of them are used depends on the features")]
 impl<T: Send + 'static> ThreadTask<T> {
     /// Starts work.
     pub fn start(threads: Threads, work: impl FnOnce() -> T + Send + 'static) -> Self {

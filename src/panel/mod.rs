@@ -42,6 +42,7 @@ mod rules_section;
 mod state;
 mod survey;
 mod terrain_controls;
+#[allow(dead_code, reason = "which of them are shown depends on the features")]
 mod texts;
 mod theme;
 pub mod tool;

@@ -26,7 +26,14 @@ impl TerrainControls {
     pub fn of(terrain: &Terrain, loose: Option<&LooseGround>, look: Option<&GroundLook>) -> Self {
         let rules = terrain.rules().cloned().unwrap_or_default();
         let undo_budget = terrain.undo_budget();
-        Self { rules, undo_budget, loose: loose.copied(), look: look.cloned(), ..Self::default() }
+        Self {
+            rules,
+            undo_budget,
+            loose: loose.copied(),
+            look: look.cloned(),
+            #[cfg(feature = "scatter")]
+            plants: None,
+        }
     }
 
     /// Applies the settings that differ from `before` to the terrain.

@@ -9,8 +9,8 @@ use bevy_egui::egui::{
     Response, RichText, Sense, Slider, SliderClamping, Stroke, StrokeKind, Ui, Vec2, emath::Numeric,
 };
 
-use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
 use super::PanelPlaces;
+use super::theme::{ACCENT, BRIGHT, COLUMN, FAINT, SLATE, TEXT};
 
 /// Positions of the widgets drawn in this frame.
 #[derive(Clone, Default)]

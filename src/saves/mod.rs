@@ -32,7 +32,9 @@ mod saving;
 
 #[cfg(feature = "replicon")]
 pub(crate) use abandoned::AbandonedStores;
-pub(crate) use closing::{ClosingWorlds, detach};
+pub(crate) use closing::ClosingWorlds;
+#[cfg(feature = "replicon")]
+pub(crate) use closing::detach;
 #[cfg(feature = "replicon")]
 pub(crate) use components::EXIT_WAIT;
 pub use components::{SavedWorld, WorldStore};
@@ -40,6 +42,7 @@ pub use components::{SavedWorld, WorldStore};
 pub use level::{BurrowLevel, LevelError, LevelLoader, LevelSaver, StartLevel};
 pub use messages::{ClosedBecause, SaveNow, StoreWarningFound, WorldClosed, WorldOpened, WorldSaved};
 pub use reading::OpeningWorld;
+#[cfg(feature = "replicon")]
 pub(crate) use reading::{ReadWorld, WorldReader};
 
 use bevy::prelude::*;

@@ -138,6 +138,7 @@ impl WorldReader {
     }
 
     /// Reads the world, or creates it. Waits while another process has it open.
+    #[cfg(feature = "replicon")]
     pub fn read(self) -> Result<ReadWorld, StoreError> {
         let start = Instant::now();
         loop {
