@@ -3,6 +3,7 @@
 mod damage;
 mod export;
 mod glb;
+mod guesses;
 mod materials;
 mod repairs;
 mod sizes;
