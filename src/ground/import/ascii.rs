@@ -122,9 +122,10 @@ impl<R: BufRead> Words<R> {
             if bytes.is_empty() {
                 break;
             }
-            let skipped = match self.word.is_empty() {
-                true => bytes.iter().position(|byte| !is_space(byte)).unwrap_or(bytes.len()),
-                false => 0,
+            let skipped = if self.word.is_empty() {
+                bytes.iter().position(|byte| !is_space(byte)).unwrap_or(bytes.len())
+            } else {
+                0
             };
             self.line += bytes[..skipped].iter().filter(|&&byte| byte == b'\n').count();
             let rest = &bytes[skipped..];
