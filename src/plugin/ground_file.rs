@@ -45,9 +45,11 @@ pub struct GroundDescription {
     pub import: ImportOptions,
     /// How tiles meet.
     pub tiles: TileEdges,
-    /// The scale. `None`: voxels of one metre, and samples as far apart as the first file says, or a voxel if it says
+    /// The scale. `None`: heights in metres, and samples as far apart as the first file says, or a voxel if it says
     /// nothing.
     pub scale: Option<ElevationScale>,
+    /// The side of a voxel in metres, if `scale` is `None`: that of the terrain's [`TerrainSettings`]. `None`: 1.
+    pub voxel_size: Option<f64>,
     /// The materials. `None`: material 0 everywhere.
     pub materials: Option<MaterialFiles>,
 }
@@ -182,7 +184,7 @@ async fn heights(
             ElevationGrid::decode(&bytes, &ImportOptions { format, ..import.clone() }).map_err(failed)?;
         report.push(format!("{name}: {found}"));
         if scale.is_none() {
-            scale = Some(found.scale(1.0).map_err(failed)?);
+            scale = Some(found.scale(description.voxel_size.unwrap_or(1.0)).map_err(failed)?);
         }
         let place = if heights.len() == 1 { Some((0, 0)) } else { tile_place(name) };
         let (column, row) = place.ok_or_else(|| GroundFileError::NoPlace(name.clone()))?;

@@ -2,11 +2,14 @@
 
 mod damage;
 mod export;
+mod exrs;
 mod glb;
+mod guesses;
 mod materials;
 mod repairs;
 mod sizes;
 mod table;
+mod tiffs;
 mod tiles;
 
 use bevy_burrow::ground::ElevationGrid;

@@ -1,6 +1,8 @@
 //! Large and long files of every format, by writers of their own, and the memory that reading them takes.
 
+use std::fs;
 use std::io::Cursor;
+use std::path::PathBuf;
 
 use allocation_counter::measure;
 use bevy_burrow::ground::{ElevationGrid, HeightFormat, ImportOptions, RawLayout};
@@ -40,6 +42,18 @@ fn tiff(width: u32, height: u32) -> Vec<u8> {
     file.into_inner()
 }
 
+/// A TIFF of floats of 64 bits in one strip, twice as large as the grid.
+fn tiff_of_doubles(width: u32, height: u32) -> Vec<u8> {
+    use tiff::encoder::{TiffEncoder, colortype::Gray64Float};
+    let mut file = Cursor::new(Vec::new());
+    let mut encoder = TiffEncoder::new(&mut file).expect("a file");
+    let doubles: Vec<f64> = samples(width, height).into_iter().map(f64::from).collect();
+    let mut image = encoder.new_image::<Gray64Float>(width, height).expect("an image");
+    image.rows_per_strip(height).expect("one strip");
+    image.write_data(&doubles).expect("samples");
+    file.into_inner()
+}
+
 fn exr(width: u32, height: u32) -> Vec<u8> {
     use exr::prelude::*;
     let pixels = |at: Vec2<usize>| (f32::from(sample(at.0 as u32, at.1 as u32)),);
@@ -56,6 +70,14 @@ fn raw(width: u32, height: u32) -> Vec<u8> {
 
 fn hgt(width: u32, height: u32) -> Vec<u8> {
     samples(width, height).into_iter().flat_map(|value| (value / 2).to_be_bytes()).collect()
+}
+
+/// Numbers with more decimals than they need, four times as large as the grid.
+fn long_ascii(width: u32, height: u32) -> Vec<u8> {
+    let text = String::from_utf8(ascii(width, height)).expect("a text");
+    let (header, samples) = text.split_at(text.find("cellsize 1\n").expect("a header") + 11);
+    let samples = samples.replace([' ', '\n'], ".0000000000 ");
+    format!("{header}{samples}").into_bytes()
 }
 
 fn ascii(width: u32, height: u32) -> Vec<u8> {
@@ -109,5 +131,34 @@ fn large_files_are_read_exactly_within_three_times_their_size() {
                 memory.bytes_max
             );
         }
+    }
+}
+
+#[test]
+fn opening_a_file_takes_no_more_than_three_times_the_grid_however_large_the_file_is() {
+    let (width, height) = (1025, 513);
+    let writers: [(HeightFormat, fn(u32, u32) -> Vec<u8>); 8] = [
+        (HeightFormat::Png, png),
+        (HeightFormat::Tiff, tiff),
+        (HeightFormat::Tiff, tiff_of_doubles),
+        (HeightFormat::Exr, exr),
+        (HeightFormat::Raw, raw),
+        (HeightFormat::Hgt, hgt),
+        (HeightFormat::Ascii, ascii),
+        (HeightFormat::Ascii, long_ascii),
+    ];
+    for (number, (format, write)) in writers.into_iter().enumerate() {
+        let (width, height) = if format == HeightFormat::Hgt { (height, height) } else { (width, height) };
+        let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("opened_{number}"));
+        fs::write(&path, write(width, height)).expect("a file");
+        let raw = RawLayout { size: Some((width, height)), ..RawLayout::default() };
+        let options = ImportOptions { format: Some(format), raw, ..ImportOptions::default() };
+        let mut opened = None;
+        let memory = measure(|| opened = Some(ElevationGrid::open(&path, &options)));
+        let (grid, _) = opened.expect("measured").unwrap_or_else(|error| panic!("{format}: {error}"));
+        assert_eq!((grid.width(), grid.height()), (width, height), "{format}");
+        let most = 3 * 4 * u64::from(width) * u64::from(height) + (1 << 20);
+        assert!(memory.bytes_max <= most, "{number}, {format}: {} bytes, not {most}", memory.bytes_max);
+        fs::remove_file(&path).expect("the file");
     }
 }

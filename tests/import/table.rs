@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use bevy_burrow::ground::{ElevationGrid, ImportOptions};
+use bevy_burrow::ground::{ElevationGrid, HeightFormat, ImportError, ImportOptions};
 use serde_json::Value;
 
 use super::hash;
@@ -78,13 +78,41 @@ fn georeferenced_files_say_where_they_lie() {
         ElevationGrid::decode(&entry.bytes, &entry.options).expect("a readable file").1
     };
     let geo = report("geo.tif");
-    assert_eq!((geo.spacing, geo.origin), (Some([30.0; 2]), Some([500_000.0, 4_600_000.0])));
+    // Its tie point is the corner of the first sample.
+    assert_eq!((geo.spacing, geo.origin), (Some([30.0; 2]), Some([500_015.0, 4_599_985.0])));
     // Nine rows of 25: the middle of the first sample of the top row.
     let corner = report("plain.asc");
     assert_eq!((corner.spacing, corner.origin), (Some([25.0; 2]), Some([500_012.5, 4_600_212.5])));
     let middle = report("centre.asc");
     assert_eq!(middle.origin, Some([500_000.0, 4_600_200.0]));
     assert_eq!(report("dx_dy.asc").spacing, Some([25.0, 30.0]));
+}
+
+#[test]
+fn a_tile_of_srtm_is_a_degree_wide_and_fits_no_voxels_before_it_is_projected() {
+    let read = |width: usize, height: usize| {
+        let bytes = vec![[0, 7], [0, 9]].concat().repeat(width * height / 2 + 1);
+        let options = ImportOptions { format: Some(HeightFormat::Hgt), ..ImportOptions::default() };
+        ElevationGrid::decode(&bytes[..width * height * 2], &options).expect("a readable file").1
+    };
+    for (width, height) in [(1201, 1201), (1801, 3601)] {
+        let report = read(width, height);
+        assert_eq!(report.spacing, Some([1.0 / (width as f64 - 1.0), 1.0 / (height as f64 - 1.0)]));
+        for voxel_size in [0.5, 1.0, 30.0] {
+            assert!(matches!(report.scale(voxel_size), Err(ImportError::Spacing { .. })));
+        }
+    }
+}
+
+#[test]
+fn files_that_are_opened_are_read_as_their_bytes_are() {
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/import");
+    for Entry { name, bytes, options, .. } in entries() {
+        let path = folder.join(&name);
+        let decoded = ElevationGrid::decode(&bytes, &options).map(|(grid, report)| (hash(&grid), report));
+        let opened = ElevationGrid::open(&path, &options).map(|(grid, report)| (hash(&grid), report));
+        assert_eq!(opened, decoded, "{name}");
+    }
 }
 
 #[test]

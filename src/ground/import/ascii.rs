@@ -1,10 +1,15 @@
 //! Heights from Esri ASCII grids.
 
+use std::io::{BufRead, ErrorKind};
+
 use super::decoded::{Decoded, reserve};
 use super::error::ImportError;
 use super::kind::{HeightFormat, SampleKind};
 use super::report::ImportNote;
 use crate::ground::ImageLimits;
+
+/// No number is longer, in bytes.
+const LONGEST_WORD: usize = 4096;
 
 /// The numbers of a grid's header.
 #[derive(Default)]
@@ -22,25 +27,28 @@ fn wrong(line: usize, problem: impl Into<String>) -> ImportError {
     ImportError::Ascii { line, problem: problem.into() }
 }
 
-/// Decodes an ASCII grid.
-pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Decoded, ImportError> {
-    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
-    let text = std::str::from_utf8(bytes).map_err(|error| {
-        let line = bytes[..error.valid_up_to()].iter().filter(|&&byte| byte == b'\n').count() + 1;
-        wrong(line, "is not text")
-    })?;
-    let mut lines = (1..).zip(text.lines()).filter(|(_, line)| !line.trim().is_empty()).peekable();
+/// Decodes an ASCII grid of `length` bytes.
+pub(super) fn decode(file: impl BufRead, length: u64, limits: &ImageLimits) -> Result<Decoded, ImportError> {
+    let mut words = Words::new(file);
     let mut header = Header::default();
-    let mut last = 1;
-    while let Some(&(number, line)) = lines.peek() {
-        let is_name = line.trim_start().starts_with(|first: char| first.is_ascii_alphabetic());
-        let is_nan = line.split_whitespace().next().is_some_and(|word| word.eq_ignore_ascii_case("nan"));
-        if !is_name || is_nan {
+    let (mut line, mut last) = (words.advance()?, 1);
+    while let Some(number) = line {
+        let name = words.text()?.to_owned();
+        let is_name = name.starts_with(|first: char| first.is_ascii_alphabetic());
+        if !is_name || name.eq_ignore_ascii_case("nan") {
             break;
         }
-        header.read(number, line)?;
         last = number;
-        lines.next();
+        line = words.advance()?;
+        let mut value = String::new();
+        if line == Some(number) {
+            value = words.text()?.to_owned();
+            line = words.advance()?;
+        }
+        if line == Some(number) {
+            return Err(wrong(number, format!("has more than one value for {}", short(&name))));
+        }
+        header.read(number, &name, &value)?;
     }
     let missing = |name| wrong(last, format!("ends a header without {name}"));
     let width = header.columns.ok_or_else(|| missing("ncols"))?;
@@ -48,22 +56,22 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Decoded, Impo
     limits.check_image(width, height, 4)?;
     let expected = u64::from(width) * u64::from(height);
     // A number takes two bytes at least: a header cannot ask for more memory than its file could fill.
-    let mut samples = reserve(expected.min(bytes.len() as u64))?;
+    let mut samples = reserve(expected.min(length))?;
     let mut is_rounded = false;
-    for (number, line) in lines {
+    while let Some(number) = line {
         last = number;
-        for word in line.split_whitespace() {
-            let value: f64 = word.parse().map_err(|_| match word.replace(',', ".").parse::<f64>() {
-                Ok(_) => wrong(number, format!("has the number {word} with a decimal comma")),
-                Err(_) => wrong(number, format!("has {:?} in place of a number", short(word))),
-            })?;
-            if samples.len() as u64 == expected {
-                return Err(wrong(number, format!("continues after {expected} samples")));
-            }
-            samples.push(value as f32);
-            // Text has decimal digits: what counts is whether the nearest f32 loses those that matter.
-            is_rounded |= (f64::from(value as f32) - value).abs() > 1e-6 * value.abs();
+        let text = words.text()?;
+        let value: f64 = text.parse().map_err(|_| match text.replace(',', ".").parse::<f64>() {
+            Ok(_) => wrong(number, format!("has the number {text} with a decimal comma")),
+            Err(_) => wrong(number, format!("has {:?} in place of a number", short(text))),
+        })?;
+        if samples.len() as u64 == expected {
+            return Err(wrong(number, format!("continues after {expected} samples")));
         }
+        samples.push(value as f32);
+        // Text has decimal digits: what counts is whether the nearest f32 loses those that matter.
+        is_rounded |= (f64::from(value as f32) - value).abs() > 1e-6 * value.abs();
+        line = words.advance()?;
     }
     if (samples.len() as u64) < expected {
         return Err(wrong(last, format!("ends after {} of {expected} samples", samples.len())));
@@ -84,6 +92,63 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<Decoded, Impo
     Ok(decoded)
 }
 
+/// The words of a text, which is never in memory as a whole.
+struct Words<R> {
+    file: R,
+    line: usize,
+    /// The word that was read last.
+    word: Vec<u8>,
+}
+
+impl<R: BufRead> Words<R> {
+    fn new(mut file: R) -> Self {
+        // An error is met again by the first word.
+        if file.fill_buf().is_ok_and(|bytes| bytes.starts_with(b"\xEF\xBB\xBF")) {
+            file.consume(3);
+        }
+        Self { file, line: 1, word: Vec::new() }
+    }
+
+    /// Reads the next word. Returns the number of its line, or `None` at the end of the text.
+    fn advance(&mut self) -> Result<Option<usize>, ImportError> {
+        let is_space = |byte: &u8| byte.is_ascii_whitespace() || *byte == b'\x0B';
+        self.word.clear();
+        loop {
+            let bytes = match self.file.fill_buf() {
+                Ok(bytes) => bytes,
+                Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+                Err(error) => return Err(wrong(self.line, format!("cannot be read ({error})"))),
+            };
+            if bytes.is_empty() {
+                break;
+            }
+            let skipped = if self.word.is_empty() {
+                bytes.iter().position(|byte| !is_space(byte)).unwrap_or(bytes.len())
+            } else {
+                0
+            };
+            self.line += bytes[..skipped].iter().filter(|&&byte| byte == b'\n').count();
+            let rest = &bytes[skipped..];
+            let end = rest.iter().position(is_space);
+            self.word.extend_from_slice(&rest[..end.unwrap_or(rest.len())]);
+            let read = skipped + end.unwrap_or(rest.len());
+            self.file.consume(read);
+            if end.is_some() {
+                break;
+            }
+            if self.word.len() > LONGEST_WORD {
+                return Err(wrong(self.line, format!("has a word of more than {LONGEST_WORD} bytes")));
+            }
+        }
+        Ok((!self.word.is_empty()).then_some(self.line))
+    }
+
+    /// The word that was read last.
+    fn text(&self) -> Result<&str, ImportError> {
+        std::str::from_utf8(&self.word).map_err(|_| wrong(self.line, "is no text"))
+    }
+}
+
 /// The beginning of a word.
 fn short(word: &str) -> String {
     word.chars().take(20).collect()
@@ -91,12 +156,7 @@ fn short(word: &str) -> String {
 
 impl Header {
     /// Reads one line, such as `ncols 1201`.
-    fn read(&mut self, number: usize, line: &str) -> Result<(), ImportError> {
-        let mut words = line.split_whitespace();
-        let (name, value) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
-        if words.next().is_some() {
-            return Err(wrong(number, format!("has more than one value for {}", short(name))));
-        }
+    fn read(&mut self, number: usize, name: &str, value: &str) -> Result<(), ImportError> {
         let refused = || wrong(number, format!("has {:?} as {}", short(value), short(name)));
         let count = || value.parse::<u32>().map_err(|_| refused());
         let real = || match value.parse::<f64>() {

@@ -16,6 +16,8 @@ pub(super) struct Decoded {
     pub no_data: Option<f64>,
     pub spacing: Option<[f64; 2]>,
     pub origin: Option<[f64; 2]>,
+    /// What turns values into heights: a factor, and what is added then.
+    pub value_scale: Option<[f64; 2]>,
     pub notes: Vec<ImportNote>,
 }
 
@@ -27,8 +29,18 @@ impl Decoded {
         (width, height): (u32, u32),
         samples: Vec<f32>,
     ) -> Self {
-        let (no_data, spacing, origin, notes) = (None, None, None, Vec::new());
-        Self { format, sample, width, height, samples, no_data, spacing, origin, notes }
+        Self {
+            format,
+            sample,
+            width,
+            height,
+            samples,
+            no_data: None,
+            spacing: None,
+            origin: None,
+            value_scale: None,
+            notes: Vec::new(),
+        }
     }
 }
 

@@ -13,8 +13,8 @@ use crate::ground::ImageLimits;
 
 const FORMAT: HeightFormat = HeightFormat::Exr;
 
-/// Names that programs give to the channel of heights, best first.
-const NAMES: [&str; 7] = ["height", "Height", "Z", "Y", "R", "z", "y"];
+/// Names that programs give to the channel of heights next to others, best first.
+const NAMED: [&str; 3] = ["height", "Height", "Z"];
 
 /// Decodes the first layer of an EXR file.
 pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> std::result::Result<Decoded, ImportError> {
@@ -42,7 +42,11 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> std::result::Result<
     let names: Vec<String> = channels.iter().map(|channel| channel.name.to_string()).collect();
     let mut notes = Vec::new();
     let find = |name: &str| names.iter().position(|own| own == name);
-    if let (Some(r), Some(g), Some(b)) = (find("R"), find("G"), find("B")) {
+    // Colours do not matter next to a channel that is named as one of heights.
+    let named = NAMED.iter().find_map(|name| find(name));
+    if named.is_none()
+        && let (Some(r), Some(g), Some(b)) = (find("R"), find("G"), find("B"))
+    {
         let at = |index: usize| u32::try_from(index).unwrap_or(u32::MAX);
         let differs = |index: &usize| {
             let value = |channel: usize| value(&channels[channel].sample_data, *index).to_bits();
@@ -55,15 +59,19 @@ pub(super) fn decode(bytes: &[u8], limits: &ImageLimits) -> std::result::Result<
         notes.push(ImportNote::GreyAsColour);
     }
     let without_alpha = || (0..names.len()).filter(|&index| names[index] != "A");
-    let chosen = match (without_alpha().count(), NAMES.iter().find_map(|name| find(name))) {
-        (0, _) => return Err(channel_error(&names)),
-        (1, _) => without_alpha().next(),
-        (3, known) if !notes.is_empty() => known,
-        _ => NAMES[..3].iter().find_map(|name| find(name)),
+    let chosen = match without_alpha().count() {
+        0 => return Err(channel_error(&names)),
+        1 => without_alpha().next(),
+        3 if !notes.is_empty() => find("R"),
+        _ => named,
     };
     let chosen = chosen.ok_or_else(|| channel_error(&names))?;
     if find("A").is_some_and(|alpha| alpha != chosen) {
         notes.push(ImportNote::AlphaIgnored);
+    }
+    let others: Vec<&str> = without_alpha().filter(|&o| o != chosen).map(|o| names[o].as_str()).collect();
+    if named.is_some() && !others.is_empty() {
+        notes.push(ImportNote::ChannelsIgnored { names: others.join(", "), read: names[chosen].clone() });
     }
     let data = channels.swap_remove(chosen).sample_data;
     drop(channels);

@@ -168,38 +168,72 @@ impl Meeting {
     }
 }
 
-/// The place of a tile as its file's name says it, as column and row; `None` if it does not.
+/// The place of a tile as its file's name says it, as column and row; `None` if it does not, or says several.
 ///
 /// | name | column and row |
 /// | --- | --- |
-/// | `island_x3_y5.png`, `island_y5_x3.r16` | 3, 5 |
+/// | `island_x3_y5.png`, `island_y5_x3.r16`, `island_1025x1025_x3_y5.png` | 3, 5 |
 /// | `island_3_5.png`, `3-5.tif` | 3, 5 |
+/// | `island_x-1_y0.png`, `island_-1_0.png` | -1, 0 |
 /// | `N46E007.hgt` | 7, -46: rows go south |
+///
+/// A minus is a sign at the beginning, and after another separator or a letter; otherwise it separates.
 pub fn tile_place(name: &str) -> Option<(i32, i32)> {
     let stem = name.rsplit(['/', '\\']).next()?;
     let stem = stem.split_once('.').map_or(stem, |(stem, _)| stem).to_ascii_lowercase();
-    let after = |letter: char| {
-        stem.char_indices().filter(|&(_, own)| own == letter).find_map(|(at, _)| {
-            let is_start = !stem[..at]
-                .ends_with(|before: char| before.is_ascii_alphanumeric() && !before.is_ascii_digit());
-            let rest = &stem[at + letter.len_utf8()..];
-            let digits = rest.len() - rest.trim_start_matches(|digit: char| digit.is_ascii_digit()).len();
-            rest[..digits].parse::<i32>().ok().filter(|_| is_start)
-        })
+    let numbers = lettered_numbers(&stem);
+    // Columns and rows that follow each other in the name.
+    let pairs = |columns: [char; 2], rows: [char; 2]| -> Vec<[(char, i32); 2]> {
+        let own: Vec<_> =
+            numbers.iter().filter(|(letter, _)| columns.contains(letter) || rows.contains(letter)).collect();
+        let sorted = |a: (char, i32), b: (char, i32)| if columns.contains(&a.0) { [a, b] } else { [b, a] };
+        let pairs = own.windows(2).map(|pair| sorted(*pair[0], *pair[1]));
+        pairs.filter(|[a, b]| columns.contains(&a.0) && rows.contains(&b.0)).collect()
     };
-    if let (Some(column), Some(row)) = (after('x'), after('y')) {
-        return Some((column, row));
+    let places = pairs(['x'; 2], ['y'; 2]);
+    if let Some(first @ [(_, column), (_, row)]) = places.first() {
+        return places.iter().all(|place| place == first).then_some((*column, *row));
     }
-    let degrees =
-        |positive: char, negative: char| after(positive).or_else(|| after(negative).map(|degrees| -degrees));
     if stem.starts_with(['n', 's'])
-        && let (Some(north), Some(east)) = (degrees('n', 's'), degrees('e', 'w'))
+        && let Some(&[(side, east), (half, north)]) = pairs(['e', 'w'], ['n', 's']).first()
     {
-        return Some((east, -north));
+        return Some((if side == 'w' { -east } else { east }, if half == 'n' { -north } else { north }));
     }
-    let mut numbers = stem.rsplit(['_', '-']).map(str::parse::<i32>);
-    match (numbers.next(), numbers.next()) {
-        (Some(Ok(row)), Some(Ok(column))) => Some((column, row)),
-        _ => None,
-    }
+    let (row, rest) = last_number(&stem)?;
+    let (column, _) = last_number(rest.strip_suffix(SEPARATORS)?)?;
+    Some((column, row))
+}
+
+/// What separates the numbers of a name.
+const SEPARATORS: [char; 2] = ['_', '-'];
+
+/// The numbers of a name that follow a letter alone, each with that letter. `1025x1025` has none: that is a size.
+fn lettered_numbers(stem: &str) -> Vec<(char, i32)> {
+    let number = |(at, letter): (usize, char)| {
+        let (before, after) = (&stem[..at], &stem[at + letter.len_utf8()..]);
+        let (sign, digits) = match after.strip_prefix('-') {
+            Some(digits) if !before.ends_with('-') => (-1, digits),
+            _ => (1, after),
+        };
+        let end = digits.find(|digit: char| !digit.is_ascii_digit()).unwrap_or(digits.len());
+        let number: i32 = digits[..end].parse().ok()?;
+        // As in `x3y5`, where the number before has its letter.
+        let is_first = !before.ends_with(char::is_alphanumeric);
+        let before_digits = before.trim_end_matches(|digit: char| digit.is_ascii_digit());
+        let follows = before_digits.len() < before.len()
+            && before_digits.strip_suffix('-').unwrap_or(before_digits).ends_with(char::is_alphabetic);
+        (is_first || follows).then_some((letter, sign * number))
+    };
+    stem.char_indices().filter(|(_, letter)| letter.is_alphabetic()).filter_map(number).collect()
+}
+
+/// The number at the end of a name, and what is before it; `None` if it is not separated from that.
+fn last_number(stem: &str) -> Option<(i32, &str)> {
+    let rest = stem.trim_end_matches(|digit: char| digit.is_ascii_digit());
+    let (rest, start) = match rest.strip_suffix('-') {
+        Some(before) if before.is_empty() || before.ends_with(SEPARATORS) => (before, rest.len() - 1),
+        _ => (rest, rest.len()),
+    };
+    let is_separated = rest.is_empty() || rest.ends_with(SEPARATORS);
+    stem[start..].parse().ok().filter(|_| is_separated).map(|number| (number, rest))
 }

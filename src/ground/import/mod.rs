@@ -4,13 +4,13 @@
 //! | --- | --- |
 //! | PNG | grey of 1 to 16 bits, interlaced or not; palettes and colours that are grey; alpha is ignored |
 //! | RAW | 16 and 32 bits, signed or not, and 32-bit floats, in either byte order; see [`RawLayout`] |
-//! | TIFF, BigTIFF (feature `import`) | one channel of 8 to 64 bits, integers or floats; GeoTIFF's scale, place and void value |
-//! | OpenEXR (feature `import`) | one channel of 16 or 32 bits |
-//! | SRTM `.hgt` | signed 16 bits, high byte first, void value -32768 |
+//! | TIFF, BigTIFF (feature `import`) | one channel of 1, 2, 4 or 8 to 64 bits, integers or floats; alpha is ignored; GeoTIFF's spacing and place, GDAL's void value, scale and offset |
+//! | OpenEXR (feature `import`) | one channel of 16 or 32 bits, or one of several that is named `height` or `Z` |
+//! | SRTM `.hgt` | signed 16 bits, high byte first, void value -32768, one degree |
 //! | Esri ASCII grid | any numbers, with its cell size, place and void value |
 //!
-//! Decoding takes at most three times the memory of the finished grid, which has 4 bytes a sample, if the file has one
-//! channel.
+//! [`ElevationGrid::open`] takes at most three times the memory of the finished grid, which has 4 bytes a sample, if the
+//! file has one channel. [`ElevationGrid::decode`] takes as much, besides the bytes that it is given.
 //!
 //! An [`ElevationGrid`] holds the values as the file has them, in whatever unit that is. [`ElevationGrid::into_ground`]
 //! makes ground of it:
@@ -35,6 +35,8 @@ mod doubts;
 mod error;
 #[cfg(feature = "import")]
 mod exr;
+#[cfg(feature = "import")]
+mod geotiff;
 mod grid;
 mod join;
 mod kind;
@@ -48,6 +50,8 @@ mod repair;
 mod report;
 #[cfg(feature = "import")]
 mod tiff;
+#[cfg(feature = "import")]
+mod white_is_zero;
 mod write;
 
 pub use super::material_map::MaterialMap;

@@ -1,6 +1,7 @@
 //! Reading a file: its format, its samples, what is wrong with them.
 
 use std::fs;
+use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 
 use super::decoded::Decoded;
@@ -14,17 +15,25 @@ use super::report::ImportReport;
 use super::{ascii, png, raw};
 use crate::ground::{ImageError, ImageLimits};
 
+/// Bytes of a file's beginning by which its format is detected.
+const HEAD: usize = 4096;
+
+/// A file that cannot be read from the disk.
+fn failed(path: &Path, error: &io::Error) -> ImportError {
+    ImportError::File { path: path.display().to_string(), reason: error.to_string() }
+}
+
+/// Checks that a file is not larger than the limits allow. Returns its length.
+fn check_length(path: &Path, limits: &ImageLimits) -> Result<u64, ImportError> {
+    let (bytes, limit) =
+        (fs::metadata(path).map_err(|error| failed(path, &error))?.len(), limits.max_file_bytes);
+    if bytes > limit { Err(ImageError::FileSize { bytes, limit }.into()) } else { Ok(bytes) }
+}
+
 /// The bytes of a file, if it is not larger than the limits allow.
 pub(super) fn read_file(path: &Path, limits: &ImageLimits) -> Result<Vec<u8>, ImportError> {
-    let failed = |error: std::io::Error| ImportError::File {
-        path: path.display().to_string(),
-        reason: error.to_string(),
-    };
-    let (bytes, limit) = (fs::metadata(path).map_err(failed)?.len(), limits.max_file_bytes);
-    if bytes > limit {
-        return Err(ImageError::FileSize { bytes, limit }.into());
-    }
-    fs::read(path).map_err(failed)
+    check_length(path, limits)?;
+    fs::read(path).map_err(|error| failed(path, &error))
 }
 
 impl ElevationGrid {
@@ -37,8 +46,37 @@ impl ElevationGrid {
         options: &ImportOptions,
     ) -> Result<(Self, ImportReport), ImportError> {
         let path = path.as_ref();
-        let format = options.format.or_else(|| HeightFormat::of_name(&path.to_string_lossy()));
-        Self::decode(&read_file(path, &options.limits)?, &ImportOptions { format, ..options.clone() })
+        let length = check_length(path, &options.limits)?;
+        let failed = |error| failed(path, &error);
+        let mut file = fs::File::open(path).map_err(failed)?;
+        let mut head = Vec::new();
+        (&mut file).take(HEAD as u64).read_to_end(&mut head).map_err(failed)?;
+        if head.is_empty() {
+            return Err(ImportError::Empty);
+        }
+        let format = match options.format.or_else(|| HeightFormat::of_name(&path.to_string_lossy())) {
+            Some(format) => format,
+            None => format_of(&head)?,
+        };
+        file.rewind().map_err(failed)?;
+        // Files of these formats may have many more bytes than samples: they are decoded while they are read.
+        let decoded = match format {
+            HeightFormat::Ascii => {
+                options.check()?;
+                ascii::decode(BufReader::new(file), length, &options.limits)?
+            }
+            #[cfg(feature = "import")]
+            HeightFormat::Tiff => {
+                options.check()?;
+                super::tiff::decode(BufReader::new(file), length, &options.limits)?
+            }
+            _ => {
+                drop(file);
+                let bytes = read_file(path, &options.limits)?;
+                return Self::decode(&bytes, &ImportOptions { format: Some(format), ..options.clone() });
+            }
+        };
+        Self::checked(decoded, options)
     }
 
     /// Decodes the bytes of a file.
@@ -55,22 +93,29 @@ impl ElevationGrid {
             Some(format) => format,
             None => format_of(bytes)?,
         };
-        let mut decoded = match format {
+        let length = bytes.len() as u64;
+        let decoded = match format {
             HeightFormat::Png => png::decode(bytes, &options.limits),
             HeightFormat::Raw => raw::decode(bytes, &options.raw, &options.limits),
             HeightFormat::Hgt => decode_hgt(bytes, options),
-            HeightFormat::Ascii => ascii::decode(bytes, &options.limits),
+            HeightFormat::Ascii => ascii::decode(bytes, length, &options.limits),
             #[cfg(feature = "import")]
-            HeightFormat::Tiff => super::tiff::decode(bytes, &options.limits),
+            HeightFormat::Tiff => super::tiff::decode(io::Cursor::new(bytes), length, &options.limits),
             #[cfg(feature = "import")]
             HeightFormat::Exr => super::exr::decode(bytes, &options.limits),
             #[cfg(not(feature = "import"))]
             HeightFormat::Tiff | HeightFormat::Exr => Err(ImportError::Feature { format }),
         }?;
+        Self::checked(decoded, options)
+    }
+
+    /// The grid of a decoded file after repairs, and its report.
+    fn checked(mut decoded: Decoded, options: &ImportOptions) -> Result<(Self, ImportReport), ImportError> {
         let doubts = doubts(&decoded);
         decoded.notes.extend(doubts);
         let repaired = repair(&mut decoded, options)?;
-        let Decoded { format, sample, width, height, samples, spacing, origin, notes, .. } = decoded;
+        let Decoded { format, sample, width, height, samples, spacing, origin, value_scale, notes, .. } =
+            decoded;
         let report = ImportReport {
             format,
             sample,
@@ -81,6 +126,7 @@ impl ElevationGrid {
             outliers: repaired.outliers,
             spacing,
             origin,
+            value_scale,
             notes,
         };
         Ok((Self::with_kind(sample, width, height, samples)?, report))
@@ -152,5 +198,7 @@ fn decode_hgt(bytes: &[u8], options: &ImportOptions) -> Result<Decoded, ImportEr
     let sample = SampleKind::Signed(16);
     let (samples, _) = raw::read(bytes, count, raw::SampleEncoding { sample, is_big_endian: true })?;
     let decoded = Decoded::new(HeightFormat::Hgt, sample, (width, height), samples);
-    Ok(Decoded { no_data: Some(-32_768.0), ..decoded })
+    // A tile covers one degree, and shares its edges with its neighbours.
+    let spacing = [width, height].map(|side| 1.0 / f64::from(side - 1));
+    Ok(Decoded { no_data: Some(-32_768.0), spacing: Some(spacing), ..decoded })
 }

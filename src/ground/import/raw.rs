@@ -102,8 +102,7 @@ pub(super) fn decode(bytes: &[u8], layout: &RawLayout, limits: &ImageLimits) -> 
             let count = u64::from(width) * u64::from(height);
             if Some(length) == count.checked_mul(4) { 4 } else { 2 }
         }
-        (None, None) if length.is_multiple_of(4) && is_square(length / 4) && !is_square(length / 2) => 4,
-        (None, None) => 2,
+        (None, None) => guess_bytes(bytes),
     };
     if layout.sample.is_none() {
         notes.push(ImportNote::SampleGuessed);
@@ -164,24 +163,101 @@ fn is_square(count: u64) -> bool {
     count.isqrt().pow(2) == count
 }
 
-/// Plausible widths of an image with `count` samples: only that of a square, if it can be one.
+/// Widths from which the size of an image with `count` samples is guessed: only that of a square, if it can be one.
 fn widths(count: u64, limits: &ImageLimits) -> Vec<u64> {
-    let is_allowed = |&width: &u64| {
-        let height = count / width;
-        width <= u64::from(limits.max_width)
-            && height <= u64::from(limits.max_height)
-            && width.max(height) <= width.min(height) * MAX_ASPECT
-    };
+    let is_allowed =
+        |&width: &u64| width <= u64::from(limits.max_width) && count / width <= u64::from(limits.max_height);
     let root = count.isqrt();
     if is_square(count) {
         return [root].into_iter().filter(is_allowed).collect();
     }
-    let divisors = (2..=root).filter(|&width| count.is_multiple_of(width));
-    divisors.flat_map(|width| [width, count / width]).filter(is_allowed).collect()
+    plausible_widths(count).filter(is_allowed).collect()
+}
+
+/// Widths of an image with `count` samples whose sides do not differ beyond reason.
+pub(super) fn plausible_widths(count: u64) -> impl Iterator<Item = u64> {
+    let divisors = (2..=count.isqrt()).filter(move |&width| count.is_multiple_of(width));
+    let sides = divisors.map(move |width| [width, count / width]);
+    sides.filter(|[short, long]| *long <= short * MAX_ASPECT).flatten()
+}
+
+/// The bytes of a sample, 2 or 4, if neither the type nor the size is known.
+fn guess_bytes(bytes: &[u8]) -> u64 {
+    let length = bytes.len() as u64;
+    if !length.is_multiple_of(4) {
+        return 2;
+    }
+    let orders = [false, true].map(|is_big_endian| Words::of(bytes, is_big_endian));
+    let (halves, smooth) = (orders.iter().any(Words::are_halves), orders.iter().any(Words::are_smooth));
+    let is_gentle = orders.iter().any(|words| words.are_smooth() && words.wild == 0);
+    match (halves, smooth, is_gentle) {
+        (true, _, false) => 4,
+        (false, true, _) => 2,
+        // The samples do not say, so their number must.
+        _ if is_square(length / 4) && !is_square(length / 2) => 4,
+        _ => 2,
+    }
+}
+
+/// How the words of 16 bits of a file vary.
+#[derive(Default)]
+struct Words {
+    /// Pairs of neighbours.
+    pairs: u32,
+    /// Pairs that differ.
+    varied: u32,
+    /// Pairs that differ by more than a sixteenth of the range.
+    wild: u32,
+    /// Sum of the differences of neighbours.
+    next: f64,
+    /// Sums of the differences of words two places apart, at even and at odd places.
+    second_next: [f64; 2],
+}
+
+impl Words {
+    fn of(bytes: &[u8], is_big_endian: bool) -> Self {
+        let reading = SampleEncoding { sample: SampleKind::Unsigned(16), is_big_endian };
+        let mut found = Self::default();
+        for run in runs(bytes, 4) {
+            let words: Vec<f64> = run.chunks_exact(2).map(|word| reading.value(word)).collect();
+            for (at, word) in words.windows(3).enumerate() {
+                let difference = (word[1] - word[0]).abs();
+                found.pairs += 1;
+                found.varied += u32::from(difference > 0.0);
+                found.wild += u32::from(difference > 4096.0);
+                found.next += difference;
+                found.second_next[at % 2] += (word[2] - word[0]).abs();
+            }
+        }
+        found
+    }
+
+    /// Whether words are halves of longer samples: the high halves are like each other and unlike the low ones.
+    fn are_halves(&self) -> bool {
+        let [even, odd] = self.second_next;
+        self.wild >= 16 && even.min(odd) * 16.0 < self.next
+    }
+
+    /// Whether neighbours are like each other, as samples of 16 bits are.
+    fn are_smooth(&self) -> bool {
+        self.varied * 16 >= self.pairs && self.next < 2048.0 * f64::from(self.pairs)
+    }
+}
+
+/// Runs of neighbours, spread over a file whose samples have `per_sample` bytes.
+fn runs(bytes: &[u8], per_sample: usize) -> impl Iterator<Item = &[u8]> {
+    let count = bytes.len() / per_sample;
+    let runs = count.div_ceil(64).clamp(1, PROBES / 64);
+    // Not at the same column of each row, where rows are as long as the distance between runs.
+    let offsets = (count / runs).saturating_sub(63).max(1);
+    (0..runs).map(move |number| {
+        let start = (count * number / runs + number * 101 % offsets) * per_sample;
+        &bytes[start..(start + 64 * per_sample).min(bytes.len())]
+    })
 }
 
 /// The sample type and byte order under which the samples vary least, of those that the layout leaves open.
-fn guess_reading(bytes: &[u8], per_sample: usize, layout: &RawLayout) -> SampleEncoding {
+fn guess_reading<'a>(bytes: &'a [u8], per_sample: usize, layout: &RawLayout) -> SampleEncoding {
     let kinds = match (layout.sample, per_sample) {
         (Some(sample), _) => vec![sample],
         (None, 4) => vec![SampleKind::Float(32), SampleKind::Unsigned(32), SampleKind::Signed(32)],
@@ -194,16 +270,9 @@ fn guess_reading(bytes: &[u8], per_sample: usize, layout: &RawLayout) -> SampleE
     let readings = orders
         .iter()
         .flat_map(|&is_big_endian| kinds.iter().map(move |&sample| SampleEncoding { sample, is_big_endian }));
-    let count = bytes.len() / per_sample;
-    // Runs of neighbours, spread over the file.
-    let runs = count.div_ceil(64).clamp(1, PROBES / 64);
     let probe = |reading: SampleEncoding| {
-        let run = |number: usize| {
-            let start = count * number / runs * per_sample;
-            let end = (start + 64 * per_sample).min(bytes.len());
-            bytes[start..end].chunks_exact(per_sample).map(move |sample| reading.value(sample))
-        };
-        roughness((0..runs).map(run), reading.sample)
+        let values = |run: &'a [u8]| run.chunks_exact(per_sample).map(move |sample| reading.value(sample));
+        roughness(runs(bytes, per_sample).map(values), reading.sample)
     };
     let rated = readings.map(|reading| (probe(reading), reading));
     // Of equals the first: low byte first, floats, unsigned.

@@ -55,6 +55,11 @@ pub(super) fn repair(decoded: &mut Decoded, options: &ImportOptions) -> Result<R
     Ok(Repaired { voids, outliers })
 }
 
+/// Whether programs write this value for samples without one.
+pub(super) fn is_well_known_void(value: f32) -> bool {
+    WELL_KNOWN.contains(&value)
+}
+
 /// Sets samples without a value to NaN.
 fn mark_voids(decoded: &mut Decoded, options: &ImportOptions) {
     let declared = [decoded.no_data.map(|value| value as f32), options.no_data];
@@ -67,7 +72,7 @@ fn mark_voids(decoded: &mut Decoded, options: &ImportOptions) {
     decoded.samples.par_iter_mut().filter(|value| is_void(**value)).for_each(|value| *value = f32::NAN);
     for end in [End::Low, End::High] {
         let Some(lone) = Lone::find(&decoded.samples, end) else { continue };
-        let is_known = WELL_KNOWN.contains(&lone.value) && !matches!(decoded.sample, SampleKind::Unsigned(_));
+        let is_known = is_well_known_void(lone.value) && !matches!(decoded.sample, SampleKind::Unsigned(_));
         if is_known && lone.gap >= lone.others {
             decoded.samples.iter_mut().filter(|v| **v == lone.value).for_each(|value| *value = f32::NAN);
             let (value, count) = (lone.value, lone.count);

@@ -27,8 +27,11 @@ pub struct ImportReport {
     pub outliers: u64,
     /// Distance between samples along x and z, where the file says it, in its own unit (metres or degrees).
     pub spacing: Option<[f64; 2]>,
-    /// Place of the first sample of the top row, where the file says it: east and north, in its own unit.
+    /// Place of the middle of the first sample of the top row, where the file says it: east and north, in its own unit.
     pub origin: Option<[f64; 2]>,
+    /// The scale and the offset that GDAL gives a file's values: heights are `value * scale + offset`. Samples are as the
+    /// file has them; [`Self::scale`] applies both.
+    pub value_scale: Option<[f64; 2]>,
     /// What was guessed, ignored or looks wrong.
     pub notes: Vec<ImportNote>,
 }
@@ -43,8 +46,24 @@ pub enum ImportNote {
     GreyAsColour,
     /// Only the first image of several was read.
     FirstOfSeveral,
-    /// Black and white are exchanged in this file (`WhiteIsZero`): values are as the decoder gives them.
+    /// Other channels than that of the heights were ignored.
+    ChannelsIgnored {
+        /// Their names.
+        names: String,
+        /// The name of the channel that was read.
+        read: String,
+    },
+    /// Black and white are exchanged in this file (`WhiteIsZero`): values are as they are stored, so that white is 0.
     WhiteIsZero,
+    /// A file says that its picture is to be turned or mirrored for display: rows are as they are stored.
+    OrientationIgnored {
+        /// TIFF's number of the orientation, 2 to 8.
+        orientation: u16,
+    },
+    /// Rows do not run east, or not from north to south: the ground lies turned or mirrored on its map.
+    NotNorthUp,
+    /// A file says where it lies in a way that is not read, such as by control points.
+    PlaceIgnored,
     /// Values were rounded to `f32`, which has 24 bits.
     Rounded,
     /// The size of a RAW file was guessed.
@@ -110,9 +129,22 @@ impl fmt::Display for ImportNote {
             Self::AlphaIgnored => f.write_str("the alpha channel was ignored"),
             Self::GreyAsColour => f.write_str("the file holds grey as colours; plain grey would be smaller"),
             Self::FirstOfSeveral => f.write_str("the file holds several images, of which the first was read"),
+            Self::ChannelsIgnored { names, read } => {
+                write!(f, "the heights are the channel {read}; the channels {names} were ignored")
+            }
             Self::WhiteIsZero => {
                 f.write_str("the file stores white as 0; exchange low and high if it looks upside down")
             }
+            Self::OrientationIgnored { orientation } => write!(
+                f,
+                "rows were read as they are stored, not turned or mirrored by the orientation {orientation} of the file"
+            ),
+            Self::NotNorthUp => f.write_str(
+                "rows do not run east, or not from north to south: the ground lies turned or mirrored on its map",
+            ),
+            Self::PlaceIgnored => f.write_str(
+                "the distance between samples and their place were not read, as the file has no plain ones: set the scale",
+            ),
             Self::Rounded => f.write_str("values were rounded to 24 bits"),
             Self::SizeGuessed => f.write_str("the size was guessed; set `RawLayout::size` if it is wrong"),
             Self::SampleGuessed => {
@@ -164,7 +196,8 @@ impl ImportReport {
     /// [`ImportError::Spacing`] if the samples are not 1 to 64 whole voxels apart, as those of files in degrees are
     /// not.
     pub fn scale(&self, voxel_size: f64) -> Result<ElevationScale, ImportError> {
-        let heights = HeightScale::Units { voxels_per_unit: voxel_size.recip(), base: 0.0 };
+        let [factor, offset] = self.value_scale.unwrap_or([1.0, 0.0]);
+        let heights = HeightScale::Units { voxels_per_unit: factor / voxel_size, base: offset / voxel_size };
         let [x, z] = self.spacing.unwrap_or([voxel_size; 2]);
         let voxels = (x / voxel_size).round();
         let fits = |spacing: f64| (spacing / voxel_size - voxels).abs() <= voxels / 100.0;
@@ -183,6 +216,9 @@ impl fmt::Display for ImportReport {
         write!(f, "; {voids} voids, {outliers} outliers")?;
         if let Some([x, z]) = self.spacing {
             write!(f, "; samples are {x} x {z} apart")?;
+        }
+        if let Some([factor, offset]) = self.value_scale {
+            write!(f, "; heights are value * {factor} + {offset}")?;
         }
         self.notes.iter().try_for_each(|note| write!(f, "\n- {note}"))
     }
