@@ -63,8 +63,8 @@ pub struct Store {
     next_record: u64,
     /// The hash of its ground.
     ground: u64,
-    /// Whether commits were skipped because too much waited; the whole world is saved next.
-    has_gap: bool,
+    /// The revision up to which commits were skipped because too much waited; the whole world is saved next.
+    skipped: Option<u64>,
     game: GameData,
     /// The game's data since the last commits, the last value of each key.
     unsent: BTreeMap<String, Option<Vec<u8>>>,
@@ -270,7 +270,7 @@ impl Store {
             next_record: terrain.log_numbers().map_or(0, |numbers| numbers.end),
             size: WorldSize::of(terrain),
             ground: terrain.world().ground().hash(),
-            has_gap: false,
+            skipped: None,
             game,
             unsent: BTreeMap::new(),
             world,
@@ -298,7 +298,7 @@ impl Store {
     fn begin_closing(&mut self) -> ClosingStore {
         // If it can't be taken, the outcome says that it is not saved.
         drop(self.send_game());
-        let is_given = self.unsent.is_empty() && !self.has_gap;
+        let is_given = self.unsent.is_empty() && self.skipped.is_none();
         let thread = self.open.take().map(|(_, thread)| thread);
         ClosingStore::new(Arc::clone(&self.shared), thread, self.point, is_given)
     }
