@@ -333,8 +333,8 @@ mod tests {
         let (world, killed) = (store.world_id(), disk.image().lose_process());
         for number in segment::list(&killed).unwrap() {
             let found = segment::read(&killed, Some(world), number).unwrap();
-            assert_eq!(found.names(u64::MAX).len(), 1);
-            let contents = FoundContents::read(&killed, found.names(u64::MAX));
+            assert_eq!(found.names(..).len(), 1);
+            let contents = FoundContents::read(&killed, found.names(..));
             killed.damage(&segment::path(number), |bytes| {
                 for frame in found.frames.iter().rev() {
                     let batch = frame.batch(&ground, &contents).unwrap();

@@ -8,7 +8,7 @@
 
 use std::collections::BTreeSet;
 use std::io;
-use std::ops::Range;
+use std::ops::{Range, RangeBounds};
 
 use super::base_level::BaseLevel;
 use super::contents::FoundContents;
@@ -171,9 +171,9 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// The names of content in its frames up to a number.
-    pub fn names(&self, last_frame: u64) -> BTreeSet<ContentId> {
-        let frames = self.frames.iter().filter(|frame| frame.number <= last_frame);
+    /// The names of content in its frames with these numbers.
+    pub fn names(&self, numbers: impl RangeBounds<u64>) -> BTreeSet<ContentId> {
+        let frames = self.frames.iter().filter(|frame| numbers.contains(&frame.number));
         frames.flat_map(|frame| frame.names.iter().flatten()).copied().collect()
     }
 

@@ -208,7 +208,7 @@ impl Store {
         let (lock, mut contents) = read(&*files, progress.as_ref())?;
         let recovered = recover(&contents, &ground, &options)?;
         if !options.salvage {
-            contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
+            contents.refuse_unread(&recovered)?;
         }
         let settled = settle(&*files, &contents, &recovered);
         let (is_log_whole, replayed, is_new) = (
@@ -235,6 +235,10 @@ impl Store {
             frame,
             lock,
         );
+        if settled.is_unfinished {
+            // Frames that are no part of the world may still be there.
+            writer.journal.keep_content(contents.names(..));
+        }
         let mut failures = Vec::new();
         if is_new {
             writer.save_all_or_later();
