@@ -275,6 +275,12 @@ impl Contents {
         chain
     }
 
+    /// Whether the frames from the first on reach this one, and all were written on this [base](segment::base).
+    pub fn reaches_back(&self, frame: u64, base: u64) -> bool {
+        let whole = self.frames_from(1);
+        whole.last().map_or(0, |last| last.number) >= frame && whole.iter().all(|own| own.base == base)
+    }
+
     /// The greatest number of a frame that was found, or 0.
     pub fn greatest_frame(&self) -> u64 {
         self.frames().map(|frame| frame.number).max().unwrap_or_default()
@@ -309,13 +315,13 @@ impl Contents {
         if let Some(error) = self.error.take_if(|_| !recovered.is_log_whole) {
             return Err(StoreError::Files { doing: "reading the regions", error });
         }
+        let has_lost_regions = findings.is_lossy && !findings.damaged.is_empty();
         let is_missed = |found: &Found| {
             let is_harmless =
                 self.is_closed || found.bad.iter().all(|bad| self.is_harmless(found.number, bad, *frame));
             found.error.is_some() && (has_lost_regions || !is_harmless)
         };
         let missed = self.segments.iter().position(is_missed);
-        let has_lost_regions = findings.is_lossy && !findings.damaged.is_empty();
         let segment = missed.and_then(|at| self.segments.get_mut(at)?.error.take());
         let names = if has_lost_regions { self.names(..) } else { self.names(frame + 1..) };
         match segment.or_else(|| self.named.take_error(&names)) {
