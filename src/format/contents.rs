@@ -52,11 +52,13 @@ impl ContentId {
     }
 }
 
-/// The key of every image's frame, and most bytes of one: no stamp and no grid has a larger image.
+/// The maximum size in bytes of an image that is sent or saved: no stamp has a larger one, and no grid, even with
+/// materials.
+pub(crate) const MAX_IMAGE: usize = (6 << 20) + (64 << 10);
+
+/// The key of every image's frame.
 #[cfg(feature = "store")]
 const IMAGE: &[u8] = b"image";
-#[cfg(feature = "store")]
-const MAX_IMAGE: usize = (6 << 20) + (64 << 10);
 
 /// An edit whose names were looked up in a table.
 #[derive(Clone, Debug, PartialEq)]

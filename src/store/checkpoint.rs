@@ -7,6 +7,7 @@ use glam::IVec3;
 use super::base_level::LevelName;
 use super::ground_size::GroundSize;
 use super::mirror::Mirror;
+use super::segment;
 use crate::format::Metadata;
 use crate::lattice::RegionPos;
 
@@ -34,6 +35,11 @@ impl Checkpoint {
         let regions = stored.map(|(at, region)| (*at, region.revision)).collect();
         let level = mirror.level.as_ref().map(|level| level.name().clone());
         Self { frame, metadata, regions, level, cells: None }
+    }
+
+    /// The [base](segment::base) of frames that lead on from it.
+    pub fn base(&self) -> u64 {
+        segment::base(self.metadata.ground, self.level.as_ref())
     }
 
     /// Encodes the checkpoint; empty if it can't be encoded, which never happens.

@@ -18,8 +18,8 @@ impl Contents {
         heads.chain(self.copies.iter().cloned())
     }
 
-    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, with which
-    /// most regions agree. It is the database's, a segment's, or that of another file if the database has none.
+    /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, exactly if
+    /// possible, with which most regions agree. It is the database's, a segment's, or that of another file if the database has none.
     pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
         let heads: Vec<Checkpoint> = self.heads().collect();
         let others = if self.records.checkpoints.is_empty() { &self.others.checkpoints[..] } else { &[] };
@@ -36,11 +36,16 @@ impl Contents {
         // Those in a file with their regions come first: over another ground, regions have equal revisions and
         // different content.
         let all = self.records.checkpoints.iter().chain(others).chain(&heads);
+        // Frames of another simulation do not lead to exactly the same world: the fewer have to be replayed, the better.
+        let foreign = |checkpoint: &Checkpoint| {
+            let (base, tail) = (checkpoint.base(), checkpoint.frame + 1..=reached(checkpoint.frame));
+            self.frames().filter(|frame| tail.contains(&frame.number) && frame.base != base).count()
+        };
         // Among equals the newest, after which least has to be replayed.
         let rank = |checkpoint: &&Checkpoint| {
             let (missing, unknown) = self.disagreeing(checkpoint);
             let lag = latest.saturating_sub(reached(checkpoint.frame));
-            (lag, missing, unknown, Reverse(checkpoint.frame))
+            (lag, foreign(checkpoint), missing, unknown, Reverse(checkpoint.frame))
         };
         all.min_by_key(rank).cloned()
     }

@@ -1,11 +1,12 @@
 //! The images and prefabs that frames of the journal name, each in a file next to the segments. It is written and made
 //! durable before the first frame that names it, and removed when no segment names it any more.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::sync::{Mutex, PoisonError};
 
 use super::files::{Files, Opening};
+use super::quarantine;
 use super::reading::read_file;
 use crate::format::contents::{ContentTable, content_file};
 use crate::format::ids::ContentId;
@@ -16,14 +17,18 @@ pub(super) const FOLDER: &str = "journal";
 /// How the names of such files end.
 const ENDING: &str = ".content";
 
+fn file_name(name: ContentId) -> String {
+    format!("{:016x}{ENDING}", name.0)
+}
+
 fn path(name: ContentId) -> String {
-    format!("{FOLDER}/{:016x}{ENDING}", name.0)
+    format!("{FOLDER}/{}", file_name(name))
 }
 
 /// The content whose file has this name.
 fn name_of(file: &str) -> Option<ContentId> {
     let name = ContentId(u64::from_str_radix(file.strip_suffix(ENDING)?, 16).ok()?);
-    path(name).ends_with(&format!("/{file}")).then_some(name)
+    (file_name(name) == file).then_some(name)
 }
 
 /// Whether a file holds the content of its name.
@@ -93,26 +98,55 @@ pub(super) fn retain(
 /// The content that was found of a world's journal. It is decoded where a frame is.
 #[derive(Debug, Default)]
 pub(super) struct FoundContents {
-    files: Vec<(ContentId, Box<[u8]>)>,
+    files: BTreeMap<ContentId, Box<[u8]>>,
+    /// Why files can't be read at the moment.
+    errors: BTreeMap<ContentId, io::Error>,
     decoded: Mutex<ContentTable>,
 }
 
 impl FoundContents {
     /// Reads the files of these names. Those that are missing or damaged are found out where a frame needs them.
     pub fn read(files: &dyn Files, names: BTreeSet<ContentId>) -> Self {
-        let read = names.into_iter().filter_map(|name| {
-            let read = read_file(files, &path(name)).ok()?;
-            Some((name, read.bytes.into_boxed_slice()))
-        });
-        Self { files: read.collect(), decoded: Mutex::default() }
+        let mut found = Self::default();
+        for name in names {
+            match read_file(files, &path(name)) {
+                Ok(read) => drop(found.files.insert(name, read.bytes.into_boxed_slice())),
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => drop(found.errors.insert(name, error)),
+            }
+        }
+        found
+    }
+
+    /// Takes out the reason why the file of one of these names can't be read at the moment.
+    pub fn take_error(&mut self, names: &BTreeSet<ContentId>) -> Option<io::Error> {
+        let name = *self.errors.keys().find(|name| names.contains(name))?;
+        self.errors.remove(&name)
+    }
+
+    /// Puts the files of these names into quarantine, as they are: copies, as others may need them too. One that can't be
+    /// read is moved unless it is among the `needed` ones, which stay.
+    pub fn keep_aside(
+        &self,
+        files: &dyn Files,
+        names: &BTreeSet<ContentId>,
+        needed: &BTreeSet<ContentId>,
+    ) -> io::Result<()> {
+        for name in names {
+            if let Some(bytes) = self.files.get(name) {
+                quarantine::copy(files, &file_name(*name), bytes)?;
+            } else if self.errors.contains_key(name) && !needed.contains(name) {
+                quarantine::file(files, &path(*name))?;
+            }
+        }
+        Ok(())
     }
 
     /// A table with the content of these names, as far as it is there and not damaged.
     pub fn table(&self, names: &[ContentId]) -> ContentTable {
         let mut decoded = self.decoded.lock().unwrap_or_else(PoisonError::into_inner);
         for name in names {
-            let file = self.files.binary_search_by_key(name, |(name, _)| *name).ok();
-            if let Some((_, bytes)) = file.and_then(|at| self.files.get(at))
+            if let Some(bytes) = self.files.get(name)
                 && !decoded.has(*name)
             {
                 decoded.add_file(*name, bytes);

@@ -1,7 +1,8 @@
 //! Reads everything that the files of a world contain, before recovery chooses from it.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
+use std::ops::RangeBounds;
 
 use super::checkpoint::Checkpoint;
 use super::contents::FoundContents;
@@ -10,12 +11,14 @@ use super::error::StoreError;
 use super::files::Files;
 use super::keys::{self, Key};
 use super::progress::{Progress, Work};
+use super::recover::Recovered;
 use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MAX_NUMBER};
 use super::sources::{self, Source};
 use super::{checkpoint_copy, unsaved};
 use crate::format::bytes::Reader;
 use crate::format::change::read_change;
 use crate::format::frame::{self, Kind, WorldId};
+use crate::format::ids::ContentId;
 use crate::format::{self, FormatError, Metadata};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
@@ -157,8 +160,7 @@ impl Contents {
             segments.push(found);
             reading.advance(1);
         }
-        let named =
-            FoundContents::read(files, segments.iter().flat_map(|found| found.names(u64::MAX)).collect());
+        let named = FoundContents::read(files, segments.iter().flat_map(|found| found.names(..)).collect());
         let numbers = segments.iter().flat_map(|found| {
             let own = found.frames.iter().map(|frame| frame.number);
             own.chain((found.length > 0).then_some(found.number))
@@ -255,6 +257,11 @@ impl Contents {
         self.segments.iter().flat_map(|found| &found.frames)
     }
 
+    /// The names of content in frames with these numbers.
+    pub fn names(&self, numbers: impl RangeBounds<u64> + Clone) -> BTreeSet<ContentId> {
+        self.segments.iter().flat_map(|found| found.names(numbers.clone())).collect()
+    }
+
     /// The frames from a number on for as long as none is missing.
     pub fn frames_from(&self, first: u64) -> Vec<&Frame> {
         let mut next = first;
@@ -266,6 +273,12 @@ impl Contents {
             }
         }
         chain
+    }
+
+    /// Whether the frames from the first on reach this one, and all were written on this [base](segment::base).
+    pub fn reaches_back(&self, frame: u64, base: u64) -> bool {
+        let whole = self.frames_from(1);
+        whole.last().map_or(0, |last| last.number) >= frame && whole.iter().all(|own| own.base == base)
     }
 
     /// The greatest number of a frame that was found, or 0.
@@ -295,18 +308,23 @@ impl Contents {
         begins || all.any(|(own, at)| is_after(own, at) && is_part(at))
     }
 
-    /// Refuses a world of which a file can't be read at the moment, if something may be in that file only.
-    pub fn refuse_unread(&mut self, frame: u64, is_rebuilt: bool) -> Result<(), StoreError> {
-        if let Some(error) = self.error.take_if(|_| !is_rebuilt) {
+    /// Refuses a world of which a file can't be read at the moment, if something may be in that file only: commits after
+    /// the last frame, or what has been lost of regions.
+    pub fn refuse_unread(&mut self, recovered: &Recovered) -> Result<(), StoreError> {
+        let Recovered { frame, findings, .. } = recovered;
+        if let Some(error) = self.error.take_if(|_| !recovered.is_log_whole) {
             return Err(StoreError::Files { doing: "reading the regions", error });
         }
+        let has_lost_regions = findings.is_lossy && !findings.damaged.is_empty();
         let is_missed = |found: &Found| {
             let is_harmless =
-                self.is_closed || found.bad.iter().all(|bad| self.is_harmless(found.number, bad, frame));
-            found.error.is_some() && !is_harmless
+                self.is_closed || found.bad.iter().all(|bad| self.is_harmless(found.number, bad, *frame));
+            found.error.is_some() && (has_lost_regions || !is_harmless)
         };
         let missed = self.segments.iter().position(is_missed);
-        match missed.and_then(|at| self.segments.get_mut(at)?.error.take()) {
+        let segment = missed.and_then(|at| self.segments.get_mut(at)?.error.take());
+        let names = if has_lost_regions { self.names(..) } else { self.names(frame + 1..) };
+        match segment.or_else(|| self.named.take_error(&names)) {
             Some(error) => Err(StoreError::Files { doing: "reading the journal", error }),
             None => Ok(()),
         }

@@ -49,7 +49,7 @@ pub struct WorldInfo {
     pub segments: usize,
     /// Bytes of the log.
     pub log_bytes: u64,
-    /// Whether the log reaches from the first commit to the last.
+    /// Whether the log reaches from the first commit to the last, and can be replayed by this version.
     pub is_log_whole: bool,
     /// Keys of the game's data, and how many bytes each has.
     pub game: Vec<(String, usize)>,
@@ -100,8 +100,7 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         frame_before = frame.number;
     }
     damage.extend(journal_warnings(&contents, frame_before, revision));
-    let whole = contents.frames_from(1);
-    let last = whole.last().map_or(0, |last| last.number);
+    let last = checkpoint.frame.max(contents.greatest_frame());
     Ok(WorldInfo {
         world: contents.world,
         revision,
@@ -116,8 +115,7 @@ pub fn inspect_in(files: &dyn Files) -> Result<WorldInfo, StoreError> {
         region_bytes,
         segments: contents.segments.len(),
         log_bytes: contents.segments.iter().map(|found| segment::on_disk(found.length as u64)).sum(),
-        is_log_whole: last >= checkpoint.frame.max(contents.greatest_frame())
-            && contents.leads_to(&checkpoint),
+        is_log_whole: contents.reaches_back(last, checkpoint.base()) && contents.leads_to(&checkpoint),
         game: game.into_iter().map(|(key, bytes): (String, Vec<u8>)| (key, bytes.len())).collect(),
         damage,
     })
@@ -210,7 +208,7 @@ fn look(
     let level = level.cloned();
     let options = StoreOptions { base_changed: BaseChanged::Refuse, level, ..StoreOptions::default() };
     let recovered = recover(&contents, ground, &options)?;
-    contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
+    contents.refuse_unread(&recovered)?;
     // Nothing was copied, as nothing was changed.
     let told = recovered.findings.warnings(&BTreeMap::new(), contents.damaged.as_deref(), None);
     let mut warnings: Vec<String> = told.iter().map(as_found).collect();

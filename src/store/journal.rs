@@ -61,6 +61,8 @@ pub(super) struct Journal {
     segments: Vec<Segment>,
     /// The content that this process has made durable.
     written: BTreeSet<ContentId>,
+    /// Other content that stays.
+    kept: BTreeSet<ContentId>,
     next_frame: u64,
     next_segment: u64,
     /// The head of the next segment: a revision and its checkpoint.
@@ -89,6 +91,7 @@ impl Journal {
             waiting_bytes: 0,
             segments,
             written: BTreeSet::new(),
+            kept: BTreeSet::new(),
             next_frame,
             next_segment,
             head: (0, Vec::new()),
@@ -99,6 +102,11 @@ impl Journal {
     /// The [base](segment::base) of later frames.
     pub fn set_base(&mut self, base: u64) {
         self.base = base;
+    }
+
+    /// Keeps the content of these names, whether or not a frame of this journal names it.
+    pub fn keep_content(&mut self, names: BTreeSet<ContentId>) {
+        self.kept = names;
     }
 
     /// The number of the last frame.
@@ -224,8 +232,8 @@ impl Journal {
             total -= segment::on_disk(oldest.bytes);
             self.segments.remove(0);
         }
-        let mut needed: BTreeSet<ContentId> =
-            self.segments.iter().flat_map(|own| &own.names).copied().collect();
+        let mut needed = self.kept.clone();
+        needed.extend(self.segments.iter().flat_map(|own| &own.names));
         needed.extend(self.waiting.iter().flat_map(|waiting| waiting.contents.names()));
         contents::retain(&*self.files, &needed, &mut self.written)
     }

@@ -14,10 +14,10 @@ use super::mirror::Mirror;
 use super::options::{BaseChanged, StoreOptions};
 use super::progress::Work;
 use super::replay_log::{RECOVERED_ANEW, REPLAY, Replayed, bytes_of, replay_good, replaying};
-use super::segment;
+use super::segment::Frame;
 use super::shared::GameData;
 use crate::ground::Ground;
-use crate::lattice::RegionPos;
+use crate::lattice::{BrickPos, RegionPos};
 use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldParts};
 
 /// The share of opening after which a world is recovered as it is on the disk.
@@ -91,8 +91,8 @@ pub(super) fn recover(
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     let is_contiguous = last >= checkpoint.frame;
-    let base = segment::base(ground, level);
-    let reaches_back = is_contiguous && whole.iter().all(|frame| frame.base == base);
+    let base = BaseLevel::base(level, ground);
+    let reaches_back = contents.reaches_back(checkpoint.frame, base);
     let has_other_log = reaches_back && !has_lost_rest && !contents.leads_to(&checkpoint);
     let is_log_whole = match has_lost_rest {
         false => reaches_back && !has_other_log,
@@ -148,7 +148,25 @@ pub(super) fn recover(
     let end = if is_same_base { RECOVERED } else { RECOVERED_ANEW };
     let work = Work::until(progress, end, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
     let grid = Terrain::new(Arc::clone(ground), &settings).map_err(RestoreError::from)?.world().grid();
-    let (parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, has_lost_rest, &work);
+    let (mut parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, has_lost_rest, &work);
+    let mut is_rebuilt = false;
+    let is_lost = is_same_base && !damaged.is_empty() && !has_lost_rest;
+    if is_lost && is_contiguous && !reaches_back && contents.leads_to(&checkpoint) {
+        // Commits of another simulation can't be verified, but say what these regions held.
+        let before: Vec<&Frame> =
+            whole.iter().copied().filter(|frame| frame.number <= checkpoint.frame).collect();
+        let replayed = replay_good(empty, &GameData::new(), &before, &contents.named, false, &work)?;
+        is_rebuilt = replayed.refused.is_none();
+        if is_rebuilt {
+            let bricks = &mut parts.change.bricks;
+            let is_damaged = |pos: &BrickPos| damaged.contains(&RegionPos::of(*pos));
+            bricks.retain(|(pos, _)| !is_damaged(pos));
+            let others = replayed.terrain.parts().change.bricks.into_iter();
+            bricks.extend(others.filter(|(pos, _)| is_damaged(pos)));
+            bricks.sort_by_key(|(pos, _)| *pos);
+            parts.change.fit_fields(grid);
+        }
+    }
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
     let restored = restore(parts.clone());
     if let (false, Err(RestoreError::Parts(_))) = (is_same_base, &restored)
@@ -172,7 +190,7 @@ pub(super) fn recover(
         }
     }
     let terrain = restored?;
-    let is_checked = is_same_base && is_exact && !is_replayed;
+    let is_checked = is_same_base && is_exact && !is_replayed && !is_rebuilt;
     let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
     let hash = terrain.world().hash();
     let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), level.cloned());
@@ -205,7 +223,7 @@ pub(super) fn recover(
         is_new: !is_checked,
         findings: Findings {
             damaged,
-            is_lossy: !is_checked,
+            is_lossy: !is_checked && !is_rebuilt,
             base_changed: (!is_same_base).then_some((regions, "kept")),
             replayed: is_replayed.then_some(replayed.commits),
             has_lost_rest,
@@ -287,20 +305,26 @@ impl Findings {
 mod tests {
     use glam::Vec3;
 
-    use super::super::{SimulatedDisk, Store};
+    use super::super::{SimulatedDisk, Store, database, inspect_in, segment};
     use super::*;
-    use crate::brush::{Brush, Shape};
+    use crate::brush::{Brush, Edit, Shape};
     use crate::format::frame::WorldId;
+    use crate::terrain::{CommitRecord, LogEntry, Order};
 
     /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
-    /// and with other hashes.
-    fn by_another_simulation(disk: &SimulatedDisk, world: WorldId, ground: &Ground) {
+    /// and with commits that are changed in this way.
+    fn by_another_simulation(
+        disk: &SimulatedDisk,
+        world: WorldId,
+        ground: &Ground,
+        change: impl Fn(&mut CommitRecord),
+    ) {
         for number in segment::list(disk).unwrap() {
             let found = segment::read(disk, Some(world), number).unwrap();
             disk.damage(&segment::path(number), |bytes| {
                 for frame in found.frames.iter().rev() {
                     let mut batch = frame.batch(ground, &Default::default()).unwrap();
-                    batch.commits.iter_mut().for_each(|record| record.hash ^= 1);
+                    batch.commits.iter_mut().for_each(&change);
                     let revision = batch.commits.last().map_or(0, |record| record.revision);
                     let entry =
                         segment::entry(world, frame.base ^ 1, frame.number, revision, &batch.encode());
@@ -333,8 +357,8 @@ mod tests {
         let (world, killed) = (store.world_id(), disk.image().lose_process());
         for number in segment::list(&killed).unwrap() {
             let found = segment::read(&killed, Some(world), number).unwrap();
-            assert_eq!(found.names(u64::MAX).len(), 1);
-            let contents = FoundContents::read(&killed, found.names(u64::MAX));
+            assert_eq!(found.names(..).len(), 1);
+            let contents = FoundContents::read(&killed, found.names(..));
             killed.damage(&segment::path(number), |bytes| {
                 for frame in found.frames.iter().rev() {
                     let batch = frame.batch(&ground, &contents).unwrap();
@@ -368,7 +392,8 @@ mod tests {
         }
         let world = store.world_id();
         let killed = disk.image().lose_process();
-        by_another_simulation(&killed, world, &ground);
+        by_another_simulation(&killed, world, &ground, |record| record.hash ^= 1);
+        assert!(!inspect_in(&killed).unwrap().is_log_whole, "it can't be verified");
         let now = terrain.world();
         for base_changed in [BaseChanged::Keep, BaseChanged::Replay, BaseChanged::Refuse] {
             let disk = killed.image().lose_process();
@@ -383,5 +408,43 @@ mod tests {
             let (_, again) = open();
             assert_eq!((again.terrain.world().hash(), again.warnings), (now.hash(), vec![]));
         }
+    }
+
+    #[test]
+    fn only_lost_regions_are_those_of_another_simulation() {
+        let (ground, disk) = (Arc::new(Ground::flat(320, 64, 20.0).unwrap()), SimulatedDisk::new());
+        let dig = |x: u32, z: f32| Brush::dig(Shape::sphere(Vec3::new(32.0 + 64.0 * x as f32, 20.0, z), 5.0));
+        let mut terrain = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).unwrap();
+        let created = Store::create_in(Arc::new(disk.clone()), &mut terrain, StoreOptions::default());
+        let mut store = created.unwrap();
+        for x in 0..5 {
+            terrain.apply([dig(x, 30.0)]);
+            store.follow(&mut terrain).unwrap();
+            if x == 3 { store.checkpoint() } else { store.flush() }.unwrap();
+        }
+        let (world, killed) = (store.world_id(), disk.image().lose_process());
+        // There, all digs but the last were elsewhere.
+        by_another_simulation(&killed, world, &ground, |record| {
+            if record.revision < 5 {
+                let edit = Edit::quantize(&dig(record.revision as u32 - 1, 40.0)).unwrap();
+                record.entries = vec![LogEntry::Order(Order::Edit(edit))];
+            }
+        });
+        let lost = RegionPos::of(BrickPos::of(glam::IVec3::new(96, 20, 30)));
+        let records = database::Records::open(&killed).unwrap();
+        records.write(&[(keys::region(lost), Some(b"damaged".to_vec()))]).unwrap();
+        drop(records);
+        let mut expected = Terrain::new(Arc::clone(&ground), &TerrainSettings::default()).unwrap();
+        expected.apply((0..5).map(|x| dig(x, if x == 1 { 40.0 } else { 30.0 })));
+        let open = || Store::open_in(Arc::new(killed.clone()), Arc::clone(&ground), StoreOptions::default());
+        let (_, opened) = open().unwrap();
+        assert_eq!(opened.terrain.world().hash(), expected.world().hash());
+        let [StoreWarning::Rebuilt { .. }, StoreWarning::Replayed { commits: 1 }] = &opened.warnings[..]
+        else {
+            panic!("{:?}", opened.warnings)
+        };
+        assert_eq!(opened.terrain.world().revision(), 5);
+        let (_, again) = open().unwrap();
+        assert_eq!((again.terrain.world().hash(), again.warnings), (expected.world().hash(), vec![]));
     }
 }

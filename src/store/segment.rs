@@ -8,9 +8,9 @@
 
 use std::collections::BTreeSet;
 use std::io;
-use std::ops::Range;
+use std::ops::{Range, RangeBounds};
 
-use super::base_level::BaseLevel;
+use super::base_level::LevelName;
 use super::contents::FoundContents;
 use super::files::Files;
 use super::reading::{is_refused, read_file};
@@ -64,12 +64,12 @@ fn key(frame: u64) -> [u8; 8] {
     frame.to_be_bytes()
 }
 
-/// Names a ground, the level on it, and how edits change them: frames that were written under another name can't be
+/// Names a ground by its hash, the level on it, and how edits change them: frames that were written under another name can't be
 /// replayed exactly.
-pub(super) fn base(ground: &Ground, level: Option<&BaseLevel>) -> u64 {
-    let level = level.map_or(0, |level| level.name().hash.rotate_left(1));
+pub(super) fn base(ground: u64, level: Option<&LevelName>) -> u64 {
+    let level = level.map_or(0, |level| level.hash.rotate_left(1));
     // Any odd number keeps simulations apart.
-    ground.hash() ^ level ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    ground ^ level ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
 /// An entry of a segment.
@@ -171,9 +171,9 @@ pub(super) struct Found {
 }
 
 impl Found {
-    /// The names of content in its frames up to a number.
-    pub fn names(&self, last_frame: u64) -> BTreeSet<ContentId> {
-        let frames = self.frames.iter().filter(|frame| frame.number <= last_frame);
+    /// The names of content in its frames with these numbers.
+    pub fn names(&self, numbers: impl RangeBounds<u64>) -> BTreeSet<ContentId> {
+        let frames = self.frames.iter().filter(|frame| numbers.contains(&frame.number));
         frames.flat_map(|frame| frame.names.iter().flatten()).copied().collect()
     }
 

@@ -75,6 +75,9 @@ fn cut_journal(
 ) -> io::Result<()> {
     let is_kept = |found: &&Found| found.frames.iter().any(|frame| frame.number <= recovered.frame);
     let last_kept = contents.segments.iter().filter(is_kept).map(|found| found.number).max().unwrap_or(0);
+    // Content is kept aside before the frames that name it.
+    let [others, needed] = [contents.names(recovered.frame + 1..), contents.names(..=recovered.frame)];
+    contents.named.keep_aside(files, &others, &needed)?;
     let (mut bytes, mut place) = (0, None);
     let mut moved = Vec::new();
     // Parts that were not written completely, and were written again elsewhere, do not matter.
@@ -88,7 +91,7 @@ fn cut_journal(
         let (last_frame, end) = kept.fold((0, 0), |(last, end): (u64, usize), frame| {
             (last.max(frame.number), end.max(frame.range.end))
         });
-        let (all, names) = (found.length as u64, found.names(recovered.frame));
+        let (all, names) = (found.length as u64, found.names(..=recovered.frame));
         if found.number < last_kept {
             // What is bad there did not matter, since later frames follow.
             segments.push(Segment { number: found.number, last_frame, bytes: all, names });

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use rustc_hash::FxHashMap;
 
+use super::base_level::BaseLevel;
 use super::checkpoint::Checkpoint;
 use super::error::{StoreError, StoreWarning};
 use super::files::{Files, Lock};
@@ -15,7 +16,7 @@ use super::message::{Answer, Content, Given, Message, game_bytes, record_bytes};
 use super::mirror::Mirror;
 use super::options::StoreOptions;
 use super::region_file::RegionFile;
-use super::segment::{FRAME_LIMIT, base};
+use super::segment::FRAME_LIMIT;
 use super::shared::{GameChange, SavePoint, Shared, apply_game};
 use super::unsaved;
 use crate::format::Batch;
@@ -119,7 +120,7 @@ impl Writer {
         checkpoint: u64,
         lock: Box<dyn Lock>,
     ) -> Self {
-        let base = base(&ground, mirror.level.as_ref());
+        let base = BaseLevel::base(mirror.level.as_ref(), &ground);
         let journal = Journal::new(Arc::clone(&files), world, base, segments, next_frame);
         let (checkpoints, state) = ([checkpoint; 2], State::default());
         let point = SavePoint { revision: mirror.revision, ..SavePoint::default() };
@@ -341,7 +342,7 @@ impl Writer {
     /// Changes the ground of the world.
     fn take_ground(&mut self, ground: Arc<Ground>) {
         if ground.hash() != self.ground.hash() {
-            self.journal.set_base(base(&ground, self.mirror.level.as_ref()));
+            self.journal.set_base(BaseLevel::base(self.mirror.level.as_ref(), &ground));
             self.state.ground_hashes.clear();
             self.mirror.mark_all();
         }

@@ -42,8 +42,8 @@ impl Terrain {
         self.log.as_ref().is_some_and(|log| !log.is_empty())
     }
 
-    /// Whether the records that wait follow this revision, and one of them sets another ground: then the world is
-    /// another one than before, and the terrain is the same.
+    /// Whether the records since the last [`take_log`](Self::take_log) follow this revision, and one of them sets
+    /// another ground: then the world is another one than before, and the terrain is the same. Dropped records count.
     #[cfg(feature = "store")]
     pub(crate) fn log_sets_ground_after(&self, revision: u64) -> bool {
         self.log.as_ref().is_some_and(|log| log.sets_ground_after(revision))

@@ -94,12 +94,15 @@ pub(super) struct CommitLog {
     /// Whether a commit was dropped after the last record that was taken. The first waiting record is a
     /// commit then: any other kind has the same revision as the dropped one, and would hide the gap.
     has_gap: bool,
+    /// Of the records since the last time that some were taken, dropped ones included: the revision before the first, and
+    /// whether one of them sets another ground.
+    since: Option<(u64, bool)>,
 }
 
 impl CommitLog {
     pub fn new(limit: usize) -> Self {
         let (records, sizes) = Default::default();
-        Self { records, sizes, bytes: 0, limit, next: 0, edit_settings: None, has_gap: false }
+        Self { records, sizes, bytes: 0, limit, next: 0, edit_settings: None, has_gap: false, since: None }
     }
 
     /// Records the commit that led to this world. Records that no longer fit are moved to `dropped`.
@@ -139,6 +142,7 @@ impl CommitLog {
     /// The records since the last call, in order. A gap shows in their revisions.
     pub fn take(&mut self) -> Vec<CommitRecord> {
         self.has_gap &= self.records.is_empty();
+        self.since = None;
         self.sizes.clear();
         self.bytes = 0;
         std::mem::take(&mut self.records).into()
@@ -161,15 +165,11 @@ impl CommitLog {
         self.records.is_empty()
     }
 
-    /// Whether the records follow this revision, and one of them sets another ground.
+    /// Whether the records since the last [`take`](Self::take) follow this revision, and one of them sets another
+    /// ground. Dropped records count.
     #[cfg(feature = "store")]
     pub fn sets_ground_after(&self, revision: u64) -> bool {
-        let sets_ground = |record: &CommitRecord| {
-            record.entries.iter().any(|entry| matches!(entry, LogEntry::Order(Order::Ground(_))))
-        };
-        let first = self.records.front();
-        first.is_some_and(|first| first.revision == revision.saturating_add(first.is_commit().into()))
-            && self.records.iter().any(sets_ground)
+        self.since == Some((revision, true))
     }
 
     fn push(
@@ -182,7 +182,10 @@ impl CommitLog {
     ) {
         let (number, revision, hash) = (self.next, world.revision(), world.hash());
         self.next += 1;
-        self.records.push_back(CommitRecord { number, revision, hash, entries, change });
+        let record = CommitRecord { number, revision, hash, entries, change };
+        let before = revision.saturating_sub(record.is_commit().into());
+        self.since.get_or_insert((before, false)).1 |= record.sets_ground();
+        self.records.push_back(record);
         self.sizes.push_back(bytes);
         self.bytes += bytes;
         self.trim(dropped);

@@ -52,6 +52,11 @@ impl CommitRecord {
         self.entries.is_empty() || self.entries.iter().any(LogEntry::is_commit)
     }
 
+    /// Whether it sets another ground.
+    pub(super) fn sets_ground(&self) -> bool {
+        self.entries.iter().any(|entry| matches!(entry, LogEntry::Order(Order::Ground(_))))
+    }
+
     /// Whether its [change](Self::change) counts: a step through history or replaced parts. Edits lead to theirs again.
     pub fn has_change(&self) -> bool {
         let is_change = |entry: &LogEntry| match entry {

@@ -154,6 +154,22 @@ fn a_paste_within_a_grid_reaches_everybody() {
 }
 
 #[test]
+fn the_largest_grid_with_materials_reaches_everybody() {
+    let (mut server, mut client, ground, mut now) = joined();
+    let grid = grid_ball(104).with_materials(|at| MaterialId(if at.y > 60 { 3 } else { 2 }));
+    assert!(grid.has_materials());
+    server.contents_mut().add(Arc::clone(grid.image()));
+    let within = GridShape::new(grid, Vec3::new(60.0, 8.0, 60.0)).with_scale(0.25);
+    server.edit(Edit::quantize(&Brush::fill(within, 0.0)).expect("valid")).expect("it is in the list");
+    let before = server.terrain().world().hash();
+    (0..1000).for_each(|_| pump(&mut server, &mut client, &mut now));
+    assert_ne!(server.terrain().world().hash(), before);
+    assert_eq!(client.world().hash(), server.terrain().world().hash());
+    assert_eq!((server.figures().malformed, client.figures().malformed), (0, 0));
+    assert!(joins_again(&mut server, &ground, &mut now).is_some());
+}
+
+#[test]
 fn a_grid_that_is_too_large_where_it_is_named_is_refused() {
     let (mut server, mut client, _, mut now) = joined();
     let (small, large) = (grid_ball(5), grid_ball(128));

@@ -5,11 +5,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::net::{Rate, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::net::{PROTOCOL, Rate, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{Files, SimulatedDisk, Store, StoreOptions};
+use bevy_burrow::terrain::SIMULATION;
 use fastrand::Rng;
 use glam::{Vec2, Vec3};
+use xxhash_rust::xxh3::Xxh3Default;
 
 use crate::follower::{Follower, agreed, count, hills, play, terrain};
 use crate::gated::{Gate, GatedDisk, Gatekeeper};
@@ -283,6 +285,65 @@ fn a_server_that_lacks_content_of_saved_entries_sends_regions() {
         agreed(&scene.server, &[&away]);
         let how = if knows { "log" } else { "compare" };
         assert_eq!((&away.joins[..], away.repairs), (&["log", how][..], 0));
+    }
+}
+
+/// The state in a store, as a build with these numbers saves it for a world without rules; without them, as builds did
+/// that did not save them.
+fn state_of(terrain: &Terrain, is_whole: bool, numbers: Option<[u32; 2]>) -> Vec<u8> {
+    let (world, mut hash) = (terrain.world(), Xxh3Default::new());
+    for number in [world.hash(), world.revision(), world.next_field()] {
+        hash.update(&number.to_le_bytes());
+    }
+    hash.update(&[0, 0]);
+    numbers.iter().flatten().for_each(|number| hash.update(&number.to_le_bytes()));
+    [&hash.digest().to_le_bytes()[..], &[is_whole.into()]].concat()
+}
+
+/// Edits of another build may lead elsewhere, and its messages may be unreadable.
+#[test]
+fn the_saved_order_of_another_build_is_not_sent() {
+    let builds = [
+        (Some([SIMULATION, PROTOCOL]), ["log", "log"]),
+        (Some([SIMULATION - 1, PROTOCOL]), ["regions", "compare"]),
+        (Some([SIMULATION, PROTOCOL - 1]), ["regions", "compare"]),
+        (None, ["regions", "compare"]),
+    ];
+    // In another build, the digs were elsewhere.
+    let mut other = Scene::new();
+    let mut digger = other.join(1);
+    other.dig(&mut [&mut digger], 20..30);
+    for (numbers, expected) in builds {
+        let is_other = numbers != Some([SIMULATION, PROTOCOL]);
+        let mut scene = Scene::new();
+        let mut a = scene.join(1);
+        scene.dig(&mut [&mut a], 0..10);
+        scene.store().flush().expect("the disk works");
+        scene.store = None;
+        let (mut store, terrain) = scene.open();
+        let key = |name: &str| {
+            let mut keys = store.game_data().keys().filter(|key| key.ends_with(name));
+            keys.next().expect("a server saves it").clone()
+        };
+        let (state, prefix) = (key("net/state"), key("net/runs").replace("runs", "order/"));
+        let number = store.get(&state).expect("it is there")[..8].to_vec();
+        store.put(state, [number, state_of(&terrain, true, numbers)].concat());
+        if is_other {
+            assert_eq!(other.server.epoch().number, scene.server.epoch().number);
+            let own: Vec<String> =
+                store.game_data().keys().filter(|key| key.starts_with(&prefix)).cloned().collect();
+            own.into_iter().for_each(|key| store.remove(key));
+            let saved = other.store.as_ref().expect("it is open").game_data();
+            let pieces = saved.iter().filter(|(key, _)| key.starts_with(&prefix));
+            pieces.for_each(|(key, piece)| store.put(key.clone(), piece.clone()));
+        }
+        scene.store = Some(store);
+        scene.restart(|disk| disk);
+        let mut new = Follower::new(2, &scene.ground);
+        scene.connect_all(&mut [&mut new, &mut a]);
+        scene.play(&mut [&mut new, &mut a], 60);
+        agreed(&scene.server, &[&new, &a]);
+        assert_eq!((new.joins[0], a.joins[1]), (expected[0], expected[1]), "{numbers:?}");
     }
 }
 

@@ -5,11 +5,14 @@ use std::sync::Arc;
 
 use bevy_burrow::format::WorldId;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, StoreWarning, from_bytes, inspect_in, to_bytes};
+use bevy_burrow::store::{
+    SimulatedDisk, Store, StoreOptions, StoreWarning, from_bytes, inspect_in, to_bytes,
+};
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{MeshKey, Meshing, PartsError};
 use fastrand::Rng;
 
+use crate::gated::{Gate, GatedDisk, Gatekeeper};
 use crate::play::{act, check_opened, count, open, options, save, state, terrain};
 use crate::worlds::{any_random_brush, random_ground_of_size};
 
@@ -150,5 +153,47 @@ fn a_saved_world_goes_on_on_its_new_ground() {
         let (_, opened) = open(&disk.image().lose_process(), other).expect("it can be opened");
         assert!(opened.warnings.iter().any(|own| matches!(own, StoreWarning::BaseChanged { .. })));
         assert_eq!(opened.terrain.world().hash(), read_over(other, &world).world().hash());
+    }
+}
+
+/// A terrain whose ground is replaced is the same one as before, even if its log has no room for that, or if the store
+/// took nothing meanwhile because the disk did not answer.
+#[test]
+fn a_new_ground_that_was_not_logged_is_saved_too() {
+    for hangs in [false, true] {
+        let ([before, after], mut rng) = (grounds(5), Rng::with_seed(5));
+        let (disk, gate) = (SimulatedDisk::new(), Gatekeeper::default());
+        let options = StoreOptions { waiting_bytes: 0, ..options(u64::MAX) };
+        let mut world = terrain(&before);
+        let files = Arc::new(GatedDisk::new(&disk, &gate));
+        let mut store = Store::create_in(files, &mut world, options).expect("a new world");
+        let mut dig = |world: &mut Terrain| drop(world.apply([any_random_brush(&mut rng, &after)]));
+        dig(&mut world);
+        save(&mut store, &mut world).expect("the thread runs");
+        store.flush().expect("the disk works");
+        let point = store.point();
+        if hangs {
+            gate.set(Gate::Shut);
+            while store.revision() == world.world().revision() {
+                store.put("filler", vec![0; 2 << 20]);
+                dig(&mut world);
+                save(&mut store, &mut world).expect("the thread runs");
+            }
+        } else {
+            world.keep_log(Some(1000));
+        }
+        world.apply_one(Order::Ground(Arc::clone(&after))).outcome.expect("it has the same size");
+        dig(&mut world);
+        store.put("filler", Vec::new());
+        save(&mut store, &mut world).expect("the thread runs");
+        gate.set(Gate::Open);
+        drop(store.flush());
+        dig(&mut world);
+        save(&mut store, &mut world).expect("the thread runs");
+        store.flush().expect("the disk works");
+        assert!(store.point().is_same_terrain(point), "it counts as another terrain, hangs: {hangs}");
+        assert_eq!(store.durable(), world.world().revision());
+        let (_, opened) = open(&disk.image().lose_process(), &after).expect("it can be opened");
+        assert_eq!((state(&opened.terrain), opened.warnings), (state(&world), vec![]), "hangs: {hangs}");
     }
 }

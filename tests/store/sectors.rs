@@ -11,7 +11,7 @@ use bevy_burrow::store::{
 };
 use glam::Vec3;
 
-use crate::play::{State, options, save, state, terrain};
+use crate::play::{State, ball, options, save, state, terrain};
 
 const DATABASE: &str = "regions.redb";
 const FIRST_SEGMENT: &str = "journal/00000001.log";
@@ -164,6 +164,39 @@ fn played(is_whole: bool, is_closed: bool) -> (SimulatedDisk, State) {
     (if is_closed { disk } else { killed }, state(&world))
 }
 
+/// A world with an edit with content in its tail, after edits without; killed, or closed with a whole log. Also the path
+/// of the content.
+fn played_with_content(is_closed: bool) -> (SimulatedDisk, State, String) {
+    let (disk, mut world) = (SimulatedDisk::new(), terrain(&ground()));
+    let store = Store::create_in(Arc::new(disk.clone()), &mut world, options(u64::MAX));
+    let mut store = store.expect("a new world");
+    for number in 0..6 {
+        let at = Vec3::new(20.0 + 33.0 * number as f32, 30.0, 20.0 + 31.0 * number as f32);
+        let grid = || GridShape::new(ball(20), at).with_scale(0.5);
+        world.apply([if number == 3 { Brush::dig(grid()) } else { Brush::dig(Shape::sphere(at, 6.0)) }]);
+        save(&mut store, &mut world).expect("the thread runs");
+        store.flush().expect("the disk works");
+    }
+    let killed = disk.image().lose_process();
+    drop(store);
+    let disk = if is_closed { disk } else { killed };
+    let path = disk.paths().into_iter().find(|path| path.ends_with(".content"));
+    (disk, state(&world), path.expect("it has content"))
+}
+
+/// All files but the lock.
+fn files(disk: &SimulatedDisk) -> Vec<(String, Vec<u8>)> {
+    let paths = disk.paths().into_iter().filter(|path| path != "lock");
+    paths.map(|path| (path.clone(), Files::read(disk, &path).expect("it is there"))).collect()
+}
+
+/// The copies in quarantine of a file of the journal.
+fn copies(disk: &SimulatedDisk, path: &str) -> Vec<Vec<u8>> {
+    let name = path.rsplit('/').next().expect("a name");
+    let own = disk.paths().into_iter().filter(|path| path.starts_with(&format!("quarantine/{name}.")));
+    own.map(|path| Files::read(disk, &path).expect("it is there")).collect()
+}
+
 /// The sectors of a file.
 fn sectors(disk: &SimulatedDisk, path: &str) -> Vec<Range<u64>> {
     let length = Files::read(disk, path).expect("it is there").len() as u64;
@@ -275,6 +308,78 @@ fn a_file_that_can_not_be_read_at_all_is_no_reason_to_lock_anybody_out() {
         }
         let (_, warnings) = open(bad(), true).unwrap_or_else(|why| panic!("{path}: {why}"));
         assert!(path != DATABASE && !path.starts_with(FIRST_SEGMENT) || !warnings.is_empty());
+    }
+}
+
+#[test]
+fn content_that_can_not_be_read_at_the_moment_is_no_damage() {
+    let (disk, expected, content) = played_with_content(false);
+    let all = 0..u64::MAX;
+    for goes in [true, false] {
+        let disk = disk.image().lose_process();
+        let before = files(&disk);
+        let refused = open(BadDisk::new(&disk, &content, all.clone(), goes), false);
+        assert!(matches!(refused, Err(StoreError::Files { .. })), "{refused:?}");
+        assert_eq!(files(&disk), before, "nothing was changed");
+        // It can be read again.
+        let (now, warnings) = open(BadDisk::new(&disk, "none", 0..0, false), false).expect("it is whole");
+        assert_eq!((now, warnings), (expected.clone(), vec![]));
+    }
+    // If the rest is asked for, the file is kept as it is.
+    let bytes = Files::read(&disk, &content).expect("it is there");
+    let (_, warnings) = open(BadDisk::new(&disk, &content, all, false), true).expect("the rest is there");
+    assert!(matches!(warnings[..], [StoreWarning::LogRefused { .. }]), "{warnings:?}");
+    assert_eq!(copies(&disk, &content), [bytes]);
+}
+
+/// While some files can't be read, they may hold regions that others have lost.
+#[test]
+fn a_region_is_not_given_up_while_a_file_of_the_log_can_not_be_read() {
+    let (disk, expected, content) = played_with_content(true);
+    Files::remove(&disk, DATABASE).expect("it is there");
+    for path in [content, FIRST_SEGMENT.to_owned()] {
+        let disk = disk.image().lose_process();
+        let before = files(&disk);
+        let refused = open(BadDisk::new(&disk, &path, 0..u64::MAX, false), false);
+        assert!(matches!(refused, Err(StoreError::Files { .. })), "{path}: {refused:?}");
+        assert_eq!(files(&disk), before, "nothing was changed");
+        let (now, _) = open(BadDisk::new(&disk, "none", 0..0, false), false).expect("the log is whole");
+        assert_eq!(now, expected, "{path}");
+    }
+}
+
+/// Frames that are kept aside can be read only with their content.
+#[test]
+fn content_of_a_log_that_is_moved_aside_is_kept_with_it() {
+    let (killed, _, content) = played_with_content(false);
+    type Damage = fn(&SimulatedDisk, &str);
+    let damages: [(&str, Damage); 2] = [
+        ("content", |disk, content| disk.damage(content, |bytes| bytes[40] ^= 1)),
+        // The first frame is behind the checkpoint at the beginning, all others behind it.
+        ("frame", |disk, _| {
+            disk.damage(FIRST_SEGMENT, |bytes| {
+                let middle = bytes.len() / 2;
+                bytes[middle] ^= 1;
+            });
+        }),
+    ];
+    for (what, damage) in damages {
+        let disk = killed.image().lose_process();
+        damage(&disk, &content);
+        let [segment, bytes] =
+            [FIRST_SEGMENT, &content].map(|path| Files::read(&disk, path).expect("it is there"));
+        let opened = Store::open_in(Arc::new(disk.clone()), ground(), options(9)).expect("the rest is there");
+        assert_eq!(opened.1.warnings.len(), 1, "{what}: {:?}", opened.1.warnings);
+        assert!(opened.1.terrain.world().revision() < 4, "{what}");
+        let (mut store, mut world) = (opened.0, opened.1.terrain);
+        world.apply([Brush::dig(Shape::sphere(Vec3::splat(40.0), 6.0))]);
+        save(&mut store, &mut world).expect("the thread runs");
+        store.checkpoint().expect("the disk works");
+        drop(store);
+        assert!(!disk.exists(&content).expect("the disk works"), "no frame of the log names it");
+        assert_eq!(copies(&disk, &content), [bytes], "{what}");
+        let tail = copies(&disk, FIRST_SEGMENT);
+        assert!(tail.len() == 1 && segment.ends_with(&tail[0]), "{what}");
     }
 }
 

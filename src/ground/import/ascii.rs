@@ -145,7 +145,7 @@ impl<R: BufRead> Words<R> {
 
     /// The word that was read last.
     fn text(&self) -> Result<&str, ImportError> {
-        std::str::from_utf8(&self.word).map_err(|_| wrong(self.line, "is no text"))
+        std::str::from_utf8(&self.word).map_err(|_| wrong(self.line, "is not text"))
     }
 }
 

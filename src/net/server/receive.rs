@@ -9,6 +9,7 @@ use super::session::Fetch;
 use super::{Later, Server, UndoRequest};
 use crate::brush::Edit;
 use crate::format::bricks::is_possible;
+use crate::format::contents::MAX_IMAGE;
 use crate::ground::GreyImage;
 use crate::lattice::RegionPos;
 use crate::net::ContentId;
@@ -25,8 +26,6 @@ const BYTES: u64 = 64;
 
 /// The maximum number of messages and regions that wait in a client's bulk lane before it may fetch more.
 const MAX_JOBS: usize = 2 * MAX_REGIONS;
-/// The maximum size in bytes of an image that is sent: no stamp and no grid has larger ones.
-const MAX_IMAGE: usize = 2 * 128 * (128 * 128 + 1);
 
 impl Server {
     /// Handles a message of a client. Any bytes are answered, or counted as invalid.

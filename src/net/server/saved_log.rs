@@ -16,11 +16,11 @@ use xxhash_rust::xxh3::Xxh3Default;
 use super::keys::{NUMBER, RESERVED};
 use crate::format::bytes::{Reader, put_number};
 use crate::format::{FormatError, plain};
-use crate::net::ContentId;
 use crate::net::encoding::EntryWriter;
 use crate::net::message::Entry;
+use crate::net::{ContentId, PROTOCOL};
 use crate::store::Store;
-use crate::terrain::Terrain;
+use crate::terrain::{SIMULATION, Terrain};
 
 /// Below [`RESERVED`].
 const ORDER: &str = "order/";
@@ -112,7 +112,7 @@ impl SavedLog {
     /// Reads the log of a store whose world is at this number and state, for a new run of the server.
     pub fn open(store: &Store, terrain: &Terrain, run: u64, number: u64, log_bytes: usize) -> FoundLog {
         let state = store.get(&format!("{RESERVED}{STATE}")).and_then(|bytes| State::decode(bytes).ok());
-        // Otherwise something has changed the world, or lost a part of it, that is in no entry.
+        // Otherwise something has changed the world, or lost a part of it, that is in no entry, or another build saved them.
         let state = state.filter(|state| (state.number, state.hash) == (number, state_of(terrain)));
         let runs = store.get(&format!("{RESERVED}{RUNS}")).filter(|_| state.is_some());
         let mut runs = runs.and_then(|bytes| decode_runs(bytes).ok()).unwrap_or_default();
@@ -262,7 +262,7 @@ impl State {
 }
 
 /// A hash of everything that entries lead to: samples and their ground, revision, names of fields, rules, loose
-/// settings.
+/// settings. Those of a build with another simulation may lead elsewhere, and with another protocol they can't be read.
 fn state_of(terrain: &Terrain) -> u64 {
     let (world, mut hash) = (terrain.world(), Xxh3Default::new());
     for number in [world.hash(), world.revision(), world.next_field()] {
@@ -270,6 +270,7 @@ fn state_of(terrain: &Terrain) -> u64 {
     }
     hash.update(&plain::to_bytes(&terrain.rules()));
     hash.update(&plain::to_bytes(&terrain.loose()));
+    [SIMULATION, PROTOCOL].iter().for_each(|number| hash.update(&number.to_le_bytes()));
     hash.digest()
 }
 

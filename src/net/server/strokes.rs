@@ -85,7 +85,8 @@ impl Strokes {
         }
     }
 
-    /// Removes the last stroke of a player, and returns the change that undoes it in this world.
+    /// Removes the last stroke of a player, and returns the change that undoes it in this world. A stroke that can't be
+    /// undone is removed too: otherwise it would be in the way of all earlier ones.
     pub fn undo(&mut self, player: ClientId, world: &World) -> Result<Patch, NoUndo> {
         let strokes = self.players.get_mut(&player).ok_or(NoUndo::Nothing)?;
         let stroke = strokes.pop_back().ok_or(NoUndo::Nothing)?;

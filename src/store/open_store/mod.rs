@@ -63,8 +63,8 @@ pub struct Store {
     next_record: u64,
     /// The hash of its ground.
     ground: u64,
-    /// Whether commits were skipped because too much waited; the whole world is saved next.
-    has_gap: bool,
+    /// The revision up to which commits were skipped because too much waited; the whole world is saved next.
+    skipped: Option<u64>,
     game: GameData,
     /// The game's data since the last commits, the last value of each key.
     unsent: BTreeMap<String, Option<Vec<u8>>>,
@@ -208,7 +208,7 @@ impl Store {
         let (lock, mut contents) = read(&*files, progress.as_ref())?;
         let recovered = recover(&contents, &ground, &options)?;
         if !options.salvage {
-            contents.refuse_unread(recovered.frame, recovered.is_log_whole)?;
+            contents.refuse_unread(&recovered)?;
         }
         let settled = settle(&*files, &contents, &recovered);
         let (is_log_whole, replayed, is_new) = (
@@ -235,6 +235,10 @@ impl Store {
             frame,
             lock,
         );
+        if settled.is_unfinished {
+            // Frames that are no part of the world may still be there.
+            writer.journal.keep_content(contents.names(..));
+        }
         let mut failures = Vec::new();
         if is_new {
             writer.save_all_or_later();
@@ -270,7 +274,7 @@ impl Store {
             next_record: terrain.log_numbers().map_or(0, |numbers| numbers.end),
             size: WorldSize::of(terrain),
             ground: terrain.world().ground().hash(),
-            has_gap: false,
+            skipped: None,
             game,
             unsent: BTreeMap::new(),
             world,
@@ -298,7 +302,7 @@ impl Store {
     fn begin_closing(&mut self) -> ClosingStore {
         // If it can't be taken, the outcome says that it is not saved.
         drop(self.send_game());
-        let is_given = self.unsent.is_empty() && !self.has_gap;
+        let is_given = self.unsent.is_empty() && self.skipped.is_none();
         let thread = self.open.take().map(|(_, thread)| thread);
         ClosingStore::new(Arc::clone(&self.shared), thread, self.point, is_given)
     }

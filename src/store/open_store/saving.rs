@@ -23,16 +23,16 @@ impl Store {
     pub fn follow(&mut self, terrain: &mut Terrain) -> Result<(), StoreError> {
         // Earlier records were made before the whole terrain was saved, which has what they say.
         let waiting = terrain.log_numbers().filter(|own| (own.start..=own.end).contains(&self.next_record));
-        let is_next = self.follows(terrain) && !self.has_gap && waiting.is_some();
+        let is_next = self.follows(terrain) && self.skipped.is_none() && waiting.is_some();
         let revision = terrain.world().revision();
         if is_next && !terrain.has_log() && self.unsent.is_empty() && revision == self.point.revision {
             return Ok(());
         }
         self.check_size(terrain)?;
-        self.ground = terrain.world().ground().hash();
+        self.turn_to(terrain);
         let mut records = terrain.take_log();
         if self.is_full() {
-            self.has_gap = true;
+            self.skipped = Some(revision);
             return self.check_thread();
         }
         if is_next {
@@ -40,7 +40,6 @@ impl Store {
         }
         let last = records.last().map_or(self.point.revision, |record| record.revision);
         if is_next && last == revision && self.continues(&records) {
-            self.version = terrain.world().version();
             return self.append(records);
         }
         // Records were dropped, or never kept.
@@ -48,10 +47,16 @@ impl Store {
         self.append_whole(terrain)
     }
 
+    /// Follows this terrain from now on. Its log can be taken then, which may be all that says that it is the last one.
+    fn turn_to(&mut self, terrain: &Terrain) {
+        self.point.terrain += u64::from(!self.follows(terrain));
+        (self.version, self.ground) = (terrain.world().version(), terrain.world().ground().hash());
+    }
+
     /// Whether this is the last given terrain, with or without later commits.
     pub(crate) fn follows(&self, terrain: &Terrain) -> bool {
         terrain.world().version().is_same_world(self.version)
-            || terrain.log_sets_ground_after(self.point.revision)
+            || terrain.log_sets_ground_after(self.skipped.unwrap_or(self.point.revision))
     }
 
     /// Replaces the last given terrain by the one that it was made from, when the next record of that one's log had
@@ -101,7 +106,7 @@ impl Store {
     /// waits for a disk that does not answer. None is taken then. [`StoreError::Ended`] when the store's thread has
     /// panicked.
     pub fn append(&mut self, records: Vec<CommitRecord>) -> Result<(), StoreError> {
-        if self.has_gap || !self.continues(&records) {
+        if self.skipped.is_some() || !self.continues(&records) {
             let found = records.first().map_or(0, |record| record.revision);
             return Err(StoreError::Gap { at: self.point.revision, found });
         }
@@ -121,17 +126,16 @@ impl Store {
     /// has panicked.
     pub fn append_whole(&mut self, terrain: &Terrain) -> Result<(), StoreError> {
         self.check_size(terrain)?;
+        if self.is_full() {
+            return Err(StoreError::Full);
+        }
+        self.turn_to(terrain);
         let world = terrain.world();
         let (parts, hash) = (Box::new(terrain.logged_parts()), world.hash());
-        let is_other = !self.follows(terrain);
-        let point = SavePoint {
-            revision: parts.revision,
-            terrain: self.point.terrain + u64::from(is_other),
-            ..self.point
-        };
+        let point = SavePoint { revision: parts.revision, ..self.point };
         self.give(point, Content::Whole(parts, world.shared_ground(), hash))?;
         self.next_record = terrain.log_numbers().map_or(0, |numbers| numbers.end);
-        (self.version, self.has_gap) = (world.version(), false);
+        self.skipped = None;
         Ok(())
     }
 
@@ -151,7 +155,7 @@ impl Store {
 
     /// Sends the game's data. While commits are missing, it waits for the world with them.
     pub(super) fn send_game(&mut self) -> Result<(), StoreError> {
-        if self.unsent.is_empty() || self.has_gap { Ok(()) } else { self.append(Vec::new()) }
+        if self.unsent.is_empty() || self.skipped.is_some() { Ok(()) } else { self.append(Vec::new()) }
     }
 
     fn send(&self, message: Message) -> Result<(), StoreError> {
