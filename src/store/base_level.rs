@@ -8,7 +8,6 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::error::StoreError;
 use super::region::Region;
-use super::segment;
 use crate::format::level::Level;
 use crate::format::portable::SavedRegion;
 use crate::format::region::region_key;
@@ -70,11 +69,6 @@ impl BaseLevel {
     /// The level itself.
     pub fn level(&self) -> &Level {
         &self.level
-    }
-
-    /// The [base](segment::base) of frames on a ground and a level.
-    pub(super) fn base(level: Option<&Self>, ground: &Ground) -> u64 {
-        segment::base(ground.hash(), level.map(Self::name))
     }
 
     /// The level of a world, if it is based on one.

@@ -11,7 +11,6 @@ use super::error::StoreError;
 use super::files::Files;
 use super::keys::{self, Key};
 use super::progress::{Progress, Work};
-use super::recover::Recovered;
 use super::segment::{self, Bad, FRAME_LIMIT, Found, Frame, MAX_NUMBER};
 use super::sources::{self, Source};
 use super::{checkpoint_copy, unsaved};
@@ -310,15 +309,18 @@ impl Contents {
 
     /// Refuses a world of which a file can't be read at the moment, if something may be in that file only: commits after
     /// the last frame, or what has been lost of regions.
-    pub fn refuse_unread(&mut self, recovered: &Recovered) -> Result<(), StoreError> {
-        let Recovered { frame, findings, .. } = recovered;
-        if let Some(error) = self.error.take_if(|_| !recovered.is_log_whole) {
+    pub fn refuse_unread(
+        &mut self,
+        frame: u64,
+        is_log_whole: bool,
+        has_lost_regions: bool,
+    ) -> Result<(), StoreError> {
+        if let Some(error) = self.error.take_if(|_| !is_log_whole) {
             return Err(StoreError::Files { doing: "reading the regions", error });
         }
-        let has_lost_regions = findings.is_lossy && !findings.damaged.is_empty();
         let is_missed = |found: &Found| {
             let is_harmless =
-                self.is_closed || found.bad.iter().all(|bad| self.is_harmless(found.number, bad, *frame));
+                self.is_closed || found.bad.iter().all(|bad| self.is_harmless(found.number, bad, frame));
             found.error.is_some() && (has_lost_regions || !is_harmless)
         };
         let missed = self.segments.iter().position(is_missed);

@@ -208,7 +208,7 @@ fn look(
     let level = level.cloned();
     let options = StoreOptions { base_changed: BaseChanged::Refuse, level, ..StoreOptions::default() };
     let recovered = recover(&contents, ground, &options)?;
-    contents.refuse_unread(&recovered)?;
+    contents.refuse_unread(recovered.frame, recovered.is_log_whole, recovered.findings.has_lost_regions())?;
     // Nothing was copied, as nothing was changed.
     let told = recovered.findings.warnings(&BTreeMap::new(), contents.damaged.as_deref(), None);
     let mut warnings: Vec<String> = told.iter().map(as_found).collect();

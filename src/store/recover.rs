@@ -14,7 +14,7 @@ use super::mirror::Mirror;
 use super::options::{BaseChanged, StoreOptions};
 use super::progress::Work;
 use super::replay_log::{RECOVERED_ANEW, REPLAY, Replayed, bytes_of, replay_good, replaying};
-use super::segment::Frame;
+use super::segment::{self, Frame};
 use super::shared::GameData;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, RegionPos};
@@ -62,6 +62,13 @@ pub(super) struct Findings {
     pub has_lost_rest: bool,
 }
 
+impl Findings {
+    /// Whether something of damaged regions is lost.
+    pub fn has_lost_regions(&self) -> bool {
+        self.is_lossy && !self.damaged.is_empty()
+    }
+}
+
 /// Recovers a world from its files.
 pub(super) fn recover(
     contents: &Contents,
@@ -91,7 +98,7 @@ pub(super) fn recover(
     let whole = contents.frames_from(1);
     let last = whole.last().map_or(0, |last| last.number);
     let is_contiguous = last >= checkpoint.frame;
-    let base = BaseLevel::base(level, ground);
+    let base = segment::base(ground.hash(), level.map(BaseLevel::name));
     let reaches_back = contents.reaches_back(checkpoint.frame, base);
     let has_other_log = reaches_back && !has_lost_rest && !contents.leads_to(&checkpoint);
     let is_log_whole = match has_lost_rest {

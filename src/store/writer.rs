@@ -16,7 +16,7 @@ use super::message::{Answer, Content, Given, Message, game_bytes, record_bytes};
 use super::mirror::Mirror;
 use super::options::StoreOptions;
 use super::region_file::RegionFile;
-use super::segment::FRAME_LIMIT;
+use super::segment::{self, FRAME_LIMIT};
 use super::shared::{GameChange, SavePoint, Shared, apply_game};
 use super::unsaved;
 use crate::format::Batch;
@@ -120,7 +120,7 @@ impl Writer {
         checkpoint: u64,
         lock: Box<dyn Lock>,
     ) -> Self {
-        let base = BaseLevel::base(mirror.level.as_ref(), &ground);
+        let base = segment::base(ground.hash(), mirror.level.as_ref().map(BaseLevel::name));
         let journal = Journal::new(Arc::clone(&files), world, base, segments, next_frame);
         let (checkpoints, state) = ([checkpoint; 2], State::default());
         let point = SavePoint { revision: mirror.revision, ..SavePoint::default() };
@@ -342,7 +342,8 @@ impl Writer {
     /// Changes the ground of the world.
     fn take_ground(&mut self, ground: Arc<Ground>) {
         if ground.hash() != self.ground.hash() {
-            self.journal.set_base(BaseLevel::base(self.mirror.level.as_ref(), &ground));
+            self.journal
+                .set_base(segment::base(ground.hash(), self.mirror.level.as_ref().map(BaseLevel::name)));
             self.state.ground_hashes.clear();
             self.mirror.mark_all();
         }

@@ -48,6 +48,7 @@ mod png;
 mod raw;
 mod repair;
 mod report;
+mod roughness;
 #[cfg(feature = "import")]
 mod tiff;
 #[cfg(feature = "import")]

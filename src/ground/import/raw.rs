@@ -1,11 +1,11 @@
 //! Heights from RAW files, which have no header: options that are not given are guessed.
 
 use super::decoded::{Decoded, reserve};
-use super::doubts::{roughness, row_difference};
 use super::error::ImportError;
 use super::kind::{HeightFormat, SampleKind};
 use super::options::RawLayout;
 use super::report::ImportNote;
+use super::roughness::{roughness, row_difference};
 use crate::ground::{ImageLimits, RawFormat};
 
 /// Longest side of a guessed size, in units of the shorter one.

@@ -208,7 +208,11 @@ impl Store {
         let (lock, mut contents) = read(&*files, progress.as_ref())?;
         let recovered = recover(&contents, &ground, &options)?;
         if !options.salvage {
-            contents.refuse_unread(&recovered)?;
+            contents.refuse_unread(
+                recovered.frame,
+                recovered.is_log_whole,
+                recovered.findings.has_lost_regions(),
+            )?;
         }
         let settled = settle(&*files, &contents, &recovered);
         let (is_log_whole, replayed, is_new) = (
