@@ -91,7 +91,7 @@ fn georeferenced_files_say_where_they_lie() {
 #[test]
 fn a_tile_of_srtm_is_a_degree_wide_and_fits_no_voxels_before_it_is_projected() {
     let read = |width: usize, height: usize| {
-        let bytes = vec![[0, 7], [0, 9]].concat().repeat(width * height / 2 + 1);
+        let bytes = [[0, 7], [0, 9]].concat().repeat(width * height / 2 + 1);
         let options = ImportOptions { format: Some(HeightFormat::Hgt), ..ImportOptions::default() };
         ElevationGrid::decode(&bytes[..width * height * 2], &options).expect("a readable file").1
     };
