@@ -261,6 +261,7 @@ fn hold_camera(
 #[cfg(test)]
 mod tests {
     use bevy::input::ButtonState;
+    use bevy_burrow::panel::ToolShape;
 
     use super::*;
 
