@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    Files, Lock, OpenFile, Opening, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning, check_in,
+    DiskFault, Files, Lock, OpenFile, Opening, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning,
+    check_in,
 };
 use glam::Vec3;
 
@@ -381,6 +382,39 @@ fn content_of_a_log_that_is_moved_aside_is_kept_with_it() {
         let tail = copies(&disk, FIRST_SEGMENT);
         assert!(tail.len() == 1 && segment.ends_with(&tail[0]), "{what}");
     }
+}
+
+/// The content of such frames is also kept if the disk is full when they should be moved aside.
+#[test]
+fn content_is_kept_though_the_disk_is_full() {
+    let (killed, _, content) = played_with_content(false);
+    let bytes = Files::read(&killed, &content).expect("it is there");
+    killed.damage(FIRST_SEGMENT, |bytes| {
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+    });
+    let mut opened = 0;
+    for begin in 0..120 {
+        let disk = killed.image().lose_process();
+        disk.fail_at(disk.operations() + begin, DiskFault::Full);
+        let files = || Arc::new(disk.clone());
+        if let Ok((mut store, own)) = Store::open_in(files(), ground(), options(9)) {
+            opened += 1;
+            let mut world = own.terrain;
+            disk.set_fault(DiskFault::None);
+            for number in 0..3 {
+                world.apply([Brush::dig(Shape::sphere(Vec3::splat(40.0 + number as f32), 6.0))]);
+                save(&mut store, &mut world).expect("the thread runs");
+                drop(store.checkpoint());
+            }
+        }
+        disk.set_fault(DiskFault::None);
+        drop(Store::open_in(files(), ground(), options(9)).expect("the rest is there"));
+        // Frames that could not be moved stay where they are, and so does what they name.
+        let is_there = Files::read(&disk, &content).is_ok_and(|own| own == bytes);
+        assert!(is_there || copies(&disk, &content).contains(&bytes), "full after {begin} operations");
+    }
+    assert!(opened > 20, "{opened}");
 }
 
 /// Pages that could not be written may look as if they were once they are read again, so the file can't be trusted any
