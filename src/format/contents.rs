@@ -273,5 +273,5 @@ pub(crate) fn read_image(reader: &mut Reader) -> Result<Arc<GreyImage>, FormatEr
         return Err(invalid);
     }
     let samples = samples.iter().map(|sample| u16::from_le_bytes(*sample)).collect();
-    GreyImage::from_samples(width, height, samples).map(Arc::new).map_err(|_| invalid)
+    GreyImage::from_long_samples(width, height, samples).map(Arc::new).map_err(|_| invalid)
 }

@@ -100,6 +100,16 @@ impl GreyImage {
     /// not `width * height` samples.
     pub fn from_samples(width: u32, height: u32, samples: Vec<u16>) -> Result<Self, ImageError> {
         ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(width, height, 2)?;
+        Self::from_long_samples(width, height, samples)
+    }
+
+    /// An image that may have twice as many rows as one of heights, as the largest grids of shapes need with materials.
+    pub(crate) fn from_long_samples(width: u32, height: u32, samples: Vec<u16>) -> Result<Self, ImageError> {
+        ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(
+            width,
+            height.div_ceil(2),
+            4,
+        )?;
         let (expected, actual) = (u64::from(width) * u64::from(height), samples.len() as u64);
         if actual != expected {
             return Err(ImageError::Length { width, height, unit: "samples", expected, actual });

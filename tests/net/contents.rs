@@ -156,7 +156,7 @@ fn a_paste_within_a_grid_reaches_everybody() {
 #[test]
 fn the_largest_grid_with_materials_reaches_everybody() {
     let (mut server, mut client, ground, mut now) = joined();
-    let grid = grid_ball(104).with_materials(|at| MaterialId(if at.y > 60 { 3 } else { 2 }));
+    let grid = grid_ball(128).with_materials(|at| MaterialId(if at.y > 60 { 3 } else { 2 }));
     assert!(grid.has_materials());
     server.contents_mut().add(Arc::clone(grid.image()));
     let within = GridShape::new(grid, Vec3::new(60.0, 8.0, 60.0)).with_scale(0.25);

@@ -175,7 +175,7 @@ impl ShapeGrid {
         samples.extend(pairs);
         let height = rows(size) + material_rows(size);
         samples.resize((size.x * height) as usize, 0);
-        match GreyImage::from_samples(size.x, height, samples) {
+        match GreyImage::from_long_samples(size.x, height, samples) {
             Ok(image) => Self::in_image(Arc::new(image)),
             Err(_) => self,
         }
