@@ -118,8 +118,8 @@ pub(super) fn ask(context: &egui::Context, files: &mut Files) {
     });
 }
 
-/// Shows a failure or running work at the top, for when the column that has the message is not in sight. Returns whether
-/// a failure was clicked away.
+/// Shows a failure or running work at the top, for when the column that has the message is not in sight. Returns
+/// whether a failure was clicked away.
 pub(super) fn alert(context: &egui::Context, note: Option<&Note>) -> bool {
     let (color, text, sense) = match note {
         Some(Note::Bad(text)) => (BAD, text, egui::Sense::click()),

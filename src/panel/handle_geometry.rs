@@ -13,8 +13,8 @@ const RING: u16 = 48;
 const NEAR: f32 = 9.0;
 /// Arrows and squares that point this much at the viewer can't be dragged: the cosine of the angle between.
 const END_ON: f32 = 0.96;
-/// A ring is seen from its edge, and is dragged along the screen instead of around, if the cosine of the angle between its axis
-/// and the line of sight is smaller than this.
+/// A ring is seen from its edge, and is dragged along the screen instead of around, if the cosine of the angle between
+/// its axis and the line of sight is smaller than this.
 const EDGE_ON: f32 = 0.2;
 
 /// An axis of the world or of a brush.
@@ -171,8 +171,8 @@ impl<'a> Frame<'a> {
         near.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, handle)| handle)
     }
 
-    /// Whether dragging may begin at this value: a size is multiplied by the ratio of the values, so it may not begin at the
-    /// middle or beyond.
+    /// Whether dragging may begin at this value: a size is multiplied by the ratio of the values, so it may not begin
+    /// at the middle or beyond.
     pub fn can_begin(&self, handle: Handle, value: f32) -> bool {
         !matches!(handle, Handle::Scale(_)) || value > 0.1 * SQUARE * self.radius
     }

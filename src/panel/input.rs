@@ -11,8 +11,8 @@ use super::open_level::{Answer, Files};
 #[derive(Resource, Reflect, Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[reflect(Resource, Default)]
 pub struct PanelInput {
-    /// The pointer is over a widget, or a handle of a [placed brush](super::BrushTool::placed), or drags one, or a question
-    /// has to be answered first.
+    /// The pointer is over a widget, or a handle of a [placed brush](super::BrushTool::placed), or drags one, or a
+    /// question has to be answered first.
     pub has_pointer: bool,
     /// Text is being typed into a widget, or a question has to be answered first. Escape cancels it.
     pub has_keyboard: bool,

@@ -23,7 +23,8 @@ impl Length {
 pub const RADIUS: Length = Length { metres: (0.5, 32.0), voxels: (0.25, 128.0) };
 /// Radius of a torus's tube.
 pub const TUBE: Length = Length { metres: (0.5, 16.0), voxels: (0.25, 64.0) };
-/// Length of cylinders, capsules and cones. An axis that is not upright is rounded, and must not become too short for a brush.
+/// Length of cylinders, capsules and cones. An axis that is not upright is rounded, and must not become too short for a
+/// brush.
 pub const LENGTH: Length = Length { metres: (1.0, 64.0), voxels: (0.5, 256.0) };
 /// How far a road levels the ground above and below it.
 pub const ROAD_HEIGHT: Length = Length { metres: (1.0, 32.0), voxels: (0.25, 64.0) };

@@ -355,8 +355,8 @@ fn draw(
     actions.write_batch(pressed);
 }
 
-/// Shows a failure or running work where the column that has the message is not in sight; returns whether it was clicked
-/// away.
+/// Shows a failure or running work where the column that has the message is not in sight; returns whether it was
+/// clicked away.
 fn show_elsewhere(context: &egui::Context, panel: &BurrowPanel) -> bool {
     let is_seen = panel.is_open && panel.shows_world && is_unfolded(context, WORLD);
     !is_seen && files::alert(context, panel.note.as_ref())

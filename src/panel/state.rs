@@ -140,7 +140,8 @@ pub enum PanelAction {
 }
 
 /// Positions of the panel's widgets in the last frame, by name, in logical pixels from the window's upper left
-/// corner. For a slider it is the rail, for a section the heading, for a value its line, for a handle a point to grab it.
+/// corner. For a slider it is the rail, for a section the heading, for a value its line, for a handle a point to grab
+/// it.
 /// While the panel is closed, there are only the handles of a [placed brush](super::BrushTool::placed) and a message.
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq)]
 #[reflect(Resource, Default)]

@@ -15,8 +15,8 @@ use crate::plugin::TerrainHit;
 /// # use bevy::prelude::*;
 /// # use bevy_burrow::prelude::*;
 /// # use bevy_burrow::panel::{BrushTool, pointer_is_free};
-/// fn sculpt(tool: Res<BrushTool>, terrains: Terrains, eye: Single<&Transform, With<Camera>>, mut brushes: MessageWriter<Brush>) {
-///     if let Some(hit) = terrains.raycast(Ray3d::new(eye.translation, eye.forward()), 200.0) {
+/// fn sculpt(tool: Res<BrushTool>, terrains: Terrains, eye: Single<&Transform, With<Camera>>, mut brushes:
+/// MessageWriter<Brush>) {     if let Some(hit) = terrains.raycast(Ray3d::new(eye.translation, eye.forward()), 200.0) {
 ///         brushes.write(tool.brush_at(&hit));
 ///     }
 /// }

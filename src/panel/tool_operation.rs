@@ -30,8 +30,8 @@ pub enum ToolOperation {
     Stamp,
     /// Cuts slopes into terraces of height [`BrushTool::step`](super::BrushTool::step).
     Terrace,
-    /// Levels the ground along a path, up and down by [`BrushTool::length`](super::BrushTool::length), with shoulders as wide as
-    /// the falloff.
+    /// Levels the ground along a path, up and down by [`BrushTool::length`](super::BrushTool::length), with shoulders
+    /// as wide as the falloff.
     Road,
     /// Puts down [`BrushTool::prefab`](super::BrushTool::prefab).
     Paste,

@@ -72,8 +72,8 @@ pub fn section(ui: &mut Ui, name: &str, is_open_at_first: bool, content: impl Fn
     state.show_body_unindented(ui, content);
 }
 
-/// A grid of tiles with `columns` per row; returns which one was clicked. Their help is shown on hover: an error says why
-/// a tile can't be chosen.
+/// A grid of tiles with `columns` per row; returns which one was clicked. Their help is shown on hover: an error says
+/// why a tile can't be chosen.
 pub fn tiles(
     ui: &mut Ui,
     columns: usize,

@@ -19,7 +19,8 @@ impl Contents {
     }
 
     /// The checkpoint to start from: one from which the journal leads to the latest state that is known of, exactly if
-    /// possible, with which most regions agree. It is the database's, a segment's, or that of another file if the database has none.
+    /// possible, with which most regions agree. It is the database's, a segment's, or that of another file if the
+    /// database has none.
     pub fn choose_checkpoint(&self) -> Option<Checkpoint> {
         let heads: Vec<Checkpoint> = self.heads().collect();
         let others = if self.records.checkpoints.is_empty() { &self.others.checkpoints[..] } else { &[] };

@@ -64,8 +64,8 @@ fn key(frame: u64) -> [u8; 8] {
     frame.to_be_bytes()
 }
 
-/// Names a ground by its hash, the level on it, and how edits change them: frames that were written under another name can't be
-/// replayed exactly.
+/// Names a ground by its hash, the level on it, and how edits change them: frames that were written under another name
+/// can't be replayed exactly.
 pub(super) fn base(ground: u64, level: Option<&LevelName>) -> u64 {
     let level = level.map_or(0, |level| level.hash.rotate_left(1));
     // Any odd number keeps simulations apart.

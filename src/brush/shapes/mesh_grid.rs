@@ -47,8 +47,8 @@ impl ShapeGrid {
     /// The grid of a closed mesh, with this many samples along its longest side: 8 to 128.
     ///
     /// Points are inside where the mesh's winding number is not 0, so parts may overlap if they face the same way; a
-    /// part inside another that faces the other way is a hole. Vertices with equal positions count as one. Distances are exact within two cells of the surface, and roughly right
-    /// beyond.
+    /// part inside another that faces the other way is a hole. Vertices with equal positions count as one. Distances
+    /// are exact within two cells of the surface, and roughly right beyond.
     ///
     /// ```
     /// use bevy_burrow::prelude::*;

@@ -73,8 +73,8 @@ fn looks_byte_swapped(decoded: &Decoded) -> bool {
         };
         roughness(rows.clone().step_by(step).map(|row| values(row).into_iter()), decoded.sample)
     };
-    // Byte-swapped ground jumps over the whole range, a quarter of it or so from sample to sample; byte-swapped ground that
-    // is gentle jumps by 256 for each unit of a step.
+    // Byte-swapped ground jumps over the whole range, a quarter of it or so from sample to sample; byte-swapped ground
+    // that is gentle jumps by 256 for each unit of a step.
     let (own, swapped) = (rough(&|value| value), rough(&swapped));
     own > 0.05 && swapped * 4.0 < own || own > 0.002 && swapped * 16.0 < own
 }

@@ -9,8 +9,8 @@
 //! | SRTM `.hgt` | signed 16 bits, high byte first, void value -32768, one degree |
 //! | Esri ASCII grid | any numbers, with its cell size, place and void value |
 //!
-//! [`ElevationGrid::open`] takes at most three times the memory of the finished grid, which has 4 bytes a sample, if the
-//! file has one channel. [`ElevationGrid::decode`] takes as much, besides the bytes that it is given.
+//! [`ElevationGrid::open`] takes at most three times the memory of the finished grid, which has 4 bytes a sample, if
+//! the file has one channel. [`ElevationGrid::decode`] takes as much, besides the bytes that it is given.
 //!
 //! An [`ElevationGrid`] holds the values as the file has them, in whatever unit that is. [`ElevationGrid::into_ground`]
 //! makes ground of it:

@@ -36,8 +36,8 @@ impl ElevationGrid {
 
     /// An Esri ASCII grid whose samples are `cell_size` apart. Values are exact; voids are -9999.
     ///
-    /// `cell_size` has the unit of the values. Those of [`World::elevation`](crate::world::World::elevation) are in voxels,
-    /// and its samples are 1 voxel apart.
+    /// `cell_size` has the unit of the values. Those of [`World::elevation`](crate::world::World::elevation) are in
+    /// voxels, and its samples are 1 voxel apart.
     pub fn encode_ascii(&self, cell_size: f64) -> String {
         let (width, height) = (self.width(), self.height());
         let mut text = format!(
