@@ -216,8 +216,8 @@
 //!         .add_systems(Update, stroke.before(BurrowSystems::Collect).run_if(click));
 //! }
 //!
-//! fn stroke(tool: Res<BrushTool>, terrains: Terrains, eye: Single<&Transform, With<Camera>>, mut brushes:
-//! MessageWriter<Brush>) {     if let Some(hit) = terrains.raycast(Ray3d::new(eye.translation, eye.forward()), 200.0) {
+//! fn stroke(tool: Res<BrushTool>, terrains: Terrains, eye: Single<&Transform, With<Camera>>, mut brushes: MessageWriter<Brush>) {
+//!     if let Some(hit) = terrains.raycast(Ray3d::new(eye.translation, eye.forward()), 200.0) {
 //!         brushes.write(tool.brush_at(&hit));
 //!     }
 //! }
