@@ -44,6 +44,7 @@ fn the_terrain_of_the_world_before_is_no_place_for_a_player() {
     let entity = app.world_mut().spawn_empty().id();
     for is_ready in [false, true] {
         app.world_mut().trigger(TerrainReady { entity });
+        app.world_mut().flush();
         assert_eq!(app.world().contains_resource::<GroundIsReady>(), is_ready);
         app.world_mut().remove_resource::<GroundIsWanted>();
     }
