@@ -118,12 +118,12 @@ pub const LOOK: &str = "Look";
 pub const QUALITY: [&str; 2] = ["Plain", "Fine"];
 /// Sizes of the panel, and their names.
 pub const UI_SCALES: [(f32, &str); 5] =
-    [(0.75, "75 %"), (1.0, "100 %"), (1.25, "125 %"), (1.5, "150 %"), (2.0, "200 %")];
+    [(0.75, "75"), (1.0, "100"), (1.25, "125"), (1.5, "150"), (2.0, "200")];
 texts! {
     VARIETY = "Variety", VARIETY_HELP = "How much colours vary from place to place",
     SCALE_STARTS = "Scale from", SCALE_ENDS = "Scale to",
     SCALE_HELP = "Distances at which textures start to grow, and where they are six times as large",
-    SETTINGS = "Settings", UI_SCALE = "Size of the panel", UI_SCALE_HELP = "Also Ctrl with + and -", UNDO_MEMORY = "History",
+    SETTINGS = "Settings", UI_SCALE = "Size of the panel in percent", UI_SCALE_HELP = "Also Ctrl with + and -", UNDO_MEMORY = "History",
     UNDO_MEMORY_HELP = "Memory that the undo history of this terrain may use", SWAPS = "Swaps",
     SWAPS_HELP = "Meshes that are replaced per frame, at most, after edits. Fewer make frames smoother.",
     LOADS = "Loads",

@@ -608,7 +608,7 @@ fn the_panel_is_larger_or_smaller_as_one_likes() {
     let mut screen = Screen::new(1280.0, 1600.0, 1);
     screen.choose("Settings");
     let place = screen.places.0["Undo"];
-    screen.choose("150 %");
+    screen.choose("150");
     assert_eq!(screen.context.zoom_factor(), 1.5);
     // Positions are those in the window.
     let larger = screen.places.0["Undo"];
