@@ -1,7 +1,7 @@
 //! The file bar: which level is open, whether it has unsaved changes, and questions before they are lost.
 
 use bevy::prelude::*;
-use bevy_egui::egui::{self, Id, Modal, RichText, TextEdit, Ui};
+use bevy_egui::egui::{self, Id, Key, Modal, RichText, TextEdit, Ui};
 
 use super::open_level::{Answer, Files, Question};
 use super::state::{BurrowPanel, Note, PanelAction};
@@ -101,7 +101,15 @@ pub(super) fn bar(
 
 /// Shows the question that waits, over everything else.
 pub(super) fn ask(context: &egui::Context, files: &mut Files) {
-    let Some(question) = files.question.clone() else { return };
+    let Some(question) = files.question.clone() else {
+        files.is_shown = false;
+        return;
+    };
+    // The key may have been pressed before: games ask with it.
+    let was_shown = std::mem::replace(&mut files.is_shown, true);
+    if was_shown && context.input(|input| input.key_pressed(Key::Escape)) {
+        files.answer = Some(Answer::Cancel);
+    }
     let (text, answers) = (question.text(), question.answers());
     // Nothing behind it shines through.
     let frame = theme::card().fill(theme::NIGHT);

@@ -2,9 +2,8 @@
 
 use bevy::prelude::*;
 use bevy_egui::EguiContext;
-use bevy_egui::egui::Key;
 
-use super::open_level::{Answer, Files};
+use super::open_level::Files;
 
 /// Whether the panel, or any other egui context, uses the pointer or the keyboard in this frame. Contexts of all
 /// cameras count. Updated in `PreUpdate`.
@@ -32,7 +31,7 @@ pub fn keyboard_is_free(input: Option<Res<PanelInput>>) -> bool {
 /// systems that act on it.
 pub(super) fn read_input(
     mut contexts: Query<&mut EguiContext>,
-    mut files: ResMut<Files>,
+    files: Res<Files>,
     mut input: ResMut<PanelInput>,
 ) {
     let is_asking = files.is_asking();
@@ -42,9 +41,6 @@ pub(super) fn read_input(
         now.has_pointer |= context.is_pointer_over_egui() || context.egui_is_using_pointer();
         // Keyboard focus alone does not count as typing.
         now.has_keyboard |= context.text_edit_focused();
-        if is_asking && context.input(|input| input.key_pressed(Key::Escape)) {
-            files.answer = Some(Answer::Cancel);
-        }
     }
     input.set_if_neq(now);
 }

@@ -20,6 +20,8 @@ pub struct Files {
     pub(super) is_busy: bool,
     /// What is asked now.
     pub(super) question: Option<Question>,
+    /// Whether it was shown already.
+    pub(super) is_shown: bool,
     pub(super) answer: Option<Answer>,
     /// The action that follows once the level is saved.
     pub(super) then: Option<PanelAction>,

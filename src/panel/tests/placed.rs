@@ -321,6 +321,7 @@ fn a_question_comes_before_a_placed_brush() {
     stage.act(PanelAction::ReleaseBrush);
     let (key, modifiers) = (egui::Key::Escape, Modifiers::NONE);
     stage.frame(vec![Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers }]);
+    stage.frame(Vec::new());
     assert_eq!((is_asked(&stage), stage.placed()), (false, placed));
     stage.frame(Vec::new());
     assert!(!stage.app.world().resource::<PanelInput>().has_keyboard);
