@@ -551,12 +551,14 @@ fn public_items_are_counted_however_they_are_written() {
              /// pub fn no() {}\npub const fn f() {}\npub struct S { pub field: u8 }\npub(crate) struct T;\n\
              impl S {\n pub fn one(&self) { g() }\n #[doc(hidden)]\n #[must_use]\n pub fn two() {}\n fn three() {}\n\
              #[must_use]\n pub const fn four() {} }\nimpl T { pub fn five() {} }";
-    let sources = crate_of(
-        &[("lib.rs", lib), ("a/mod.rs", a), ("b.rs", "pub struct G;"), ("c.rs", "pub struct H;")]
-            .into_iter()
-            .chain([("e/mod.rs", "pub mod f;\npub struct I;"), ("e/f.rs", "pub struct J;\npub struct K;")])
-            .collect::<Vec<_>>(),
-    );
+    let sources = crate_of(&[
+        ("lib.rs", lib),
+        ("a/mod.rs", a),
+        ("b.rs", "pub struct G;"),
+        ("c.rs", "pub struct H;"),
+        ("e/mod.rs", "pub mod f;\npub struct I;"),
+        ("e/f.rs", "pub struct J;\npub struct K;"),
+    ]);
     assert_eq!(shown_names(&sources), ["a::A", "a::B", "a::D", "a::f", "a::S", "e::f::J", "e::f::K", "e::I"]);
     assert_eq!(shown_functions(&sources, "a/", "S"), ["one", "four"]);
 }

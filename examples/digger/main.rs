@@ -75,7 +75,7 @@ use clap::Parser;
 
 use crate::party::connection::{Address, Party};
 use crate::ui::settings::{Quality, Settings, SettingsFile};
-use crate::world::saves::{self, WorldsFolder};
+use crate::world::folders::{self, WorldsFolder};
 
 /// A first-person game on a landscape that can be dug.
 #[derive(Parser, Clone, Debug)]
@@ -246,7 +246,7 @@ fn open_window(options: &Options) -> App {
         Window { title: "Digger".into(), resolution: (options.width, options.height).into(), ..default() };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }));
-    app.insert_resource(GroundTextureCache(saves::folder_of_textures()));
+    app.insert_resource(GroundTextureCache(folders::folder_of_textures()));
     let worlds = WorldsFolder::of_user();
     let world = options.saved_world().or_else(|| worlds.latest());
     // Where that fails, "Play" says why.

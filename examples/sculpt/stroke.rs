@@ -47,7 +47,7 @@ pub struct Strokes {
     count: u64,
     /// The stroke that is drawn: one press of the button, and one step of undo.
     number: u64,
-    /// Whether that stroke goes on while the button is held.
+    /// Whether that stroke continues while the button is held.
     is_held: bool,
     rest: Timer,
     /// Where the last brush was.
@@ -206,19 +206,6 @@ fn stroke(
     strokes.rest = Timer::new(Duration::from_secs_f32(1.0 / tool.rate.max(0.1)), TimerMode::Once);
 }
 
-/// Positions along the curve of [`BrushPath::spline`](bevy_burrow::brush::BrushPath::spline).
-fn curve_through(points: &[Vec3]) -> Vec<Vec3> {
-    let corners = points.windows(2).enumerate().map(|(index, ends)| {
-        let before = points[index.saturating_sub(1)];
-        let after = points[(index + 2).min(points.len() - 1)];
-        [ends[0], ends[0] + (ends[1] - before) / 6.0, ends[1] - (after - ends[0]) / 6.0, ends[1]]
-    });
-    match CubicBezier::new(corners).to_curve() {
-        Ok(curve) => curve.iter_positions(16 * points.len()).collect(),
-        Err(_) => points.to_vec(),
-    }
-}
-
 /// Positions along a straight line, at most `apart` from each other, up to its end. Without a start, only the end.
 fn line(from: Option<Vec3>, to: Vec3, apart: f32) -> impl Iterator<Item = Vec3> {
     let steps = from.map_or(0, |from| (from.distance(to) / apart.max(0.25)).ceil().min(400.0) as u32);
@@ -248,10 +235,13 @@ fn preview(
         draw_shape(&mut gizmos, &tool.shape_at(hit), color.with_alpha(0.5));
     }
     if tool.fitting_shape() == ToolShape::Path {
-        let points: Vec<Vec3> = tool.points.iter().copied().chain([hit.position]).collect();
-        gizmos.linestrip(if tool.is_smooth { curve_through(&points) } else { points }, color);
-        for point in &tool.points {
-            draw_shape(&mut gizmos, &Shape::sphere(*point, tool.radius), color.with_alpha(0.3));
+        let ends = tool.points.iter().chain([&hit.position]).map(|&point| (point, tool.radius));
+        let points: Vec<(Vec3, f32)> = ends.collect();
+        let draw = |tube: Shape| draw_shape(&mut gizmos, &tube, color.with_alpha(0.5));
+        if tool.is_smooth {
+            Shape::along_spline(&points).for_each(draw);
+        } else {
+            Shape::along_polyline(&points).for_each(draw);
         }
     }
     let turn = tool.rotation(hit);

@@ -15,7 +15,7 @@ pub(super) struct BrickEditor<'a> {
     pub pos: BrickPos,
     /// The brick before the edits.
     base: Option<&'a Brick>,
-    /// The brick as edited so far; `None` until its first sample changes.
+    /// The brick with the edits that were applied; `None` until its first sample changes.
     brick: Option<Brick>,
     /// Heights of its columns.
     pub heights: [[i32; 8]; 8],

@@ -52,8 +52,13 @@ impl ImageLimits {
         if bytes > limit { Err(ImageError::FileSize { bytes, limit }) } else { Ok(()) }
     }
 
+    /// Checks that the sides of an image in memory are within what any world can use.
+    pub(crate) fn check_sides(width: u32, height: u32) -> Result<(), ImageError> {
+        Self { max_alloc_bytes: u64::MAX, ..Self::default() }.check_image(width, height, 1)
+    }
+
     /// Checks the dimensions that a file declares, and the memory for them at `bytes_per_sample`.
-    pub(crate) fn check_image(
+    pub(super) fn check_image(
         &self,
         width: u32,
         height: u32,
@@ -99,17 +104,13 @@ impl GreyImage {
     /// [`ImageError::Empty`], [`ImageError::Dimensions`] (a side over 16385) or [`ImageError::Length`] if there are
     /// not `width * height` samples.
     pub fn from_samples(width: u32, height: u32, samples: Vec<u16>) -> Result<Self, ImageError> {
-        ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(width, height, 2)?;
+        ImageLimits::check_sides(width, height)?;
         Self::from_long_samples(width, height, samples)
     }
 
     /// An image that may have twice as many rows as one of heights, as the largest grids of shapes need with materials.
     pub(crate) fn from_long_samples(width: u32, height: u32, samples: Vec<u16>) -> Result<Self, ImageError> {
-        ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(
-            width,
-            height.div_ceil(2),
-            4,
-        )?;
+        ImageLimits::check_sides(width, height.div_ceil(2))?;
         let (expected, actual) = (u64::from(width) * u64::from(height), samples.len() as u64);
         if actual != expected {
             return Err(ImageError::Length { width, height, unit: "samples", expected, actual });

@@ -24,7 +24,7 @@ impl MaterialMap {
     /// # Errors
     /// [`ImageError::Empty`], [`ImageError::Dimensions`] (a side over 16385) or [`ImageError::Length`].
     pub fn from_columns(width: u32, height: u32, columns: Vec<ColumnMaterial>) -> Result<Self, ImageError> {
-        ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(width, height, 3)?;
+        ImageLimits::check_sides(width, height)?;
         let (expected, actual) = (u64::from(width) * u64::from(height), columns.len() as u64);
         if actual != expected {
             return Err(ImageError::Length { width, height, unit: "samples", expected, actual });

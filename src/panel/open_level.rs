@@ -113,7 +113,7 @@ impl Files {
         for (entity, terrain) in terrains {
             let mut level = self.levels.remove(&entity).unwrap_or_default();
             let saved = level.saved.get_or_insert_with(|| LevelState::of(terrain));
-            level.is_unsaved = !saved.is_still(terrain) || terrain.queued() > 0;
+            level.is_unsaved = !saved.is_still(terrain) || terrain.waiting_work() > 0;
             there.insert(entity, level);
         }
         (self.levels, self.chosen) = (there, chosen);
@@ -179,8 +179,8 @@ impl Files {
 
     /// The action to perform now, if it may be: one that loses something is asked about first.
     pub fn admit(&mut self, action: PanelAction, panel: &BurrowPanel) -> Option<PanelAction> {
-        let may_lose = matches!(action, PanelAction::NewLevel | PanelAction::LoadLevel | PanelAction::Quit);
-        let loses = may_lose && self.unsaved_before(action).is_some();
+        let replaces = matches!(action, PanelAction::NewLevel | PanelAction::LoadLevel | PanelAction::Quit);
+        let loses = replaces && self.unsaved_before(action).is_some();
         let may_lose = self.may_lose.take_if(|own| *own == action).is_some();
         // Until it is answered, nothing else is done.
         if self.question.is_some() {

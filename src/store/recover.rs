@@ -17,7 +17,7 @@ use super::replay_log::{RECOVERED_ANEW, REPLAY, Replayed, bytes_of, replay_good,
 use super::segment::{self, Frame};
 use super::shared::GameData;
 use crate::ground::Ground;
-use crate::lattice::{BrickPos, RegionPos};
+use crate::lattice::{BrickPos, ChunkGrid, RegionPos};
 use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldParts};
 
 /// The share of opening after which a world is recovered as it is on the disk.
@@ -60,6 +60,16 @@ pub(super) struct Findings {
     pub replayed: Option<u64>,
     /// Whether everything but the regions is lost.
     pub has_lost_rest: bool,
+}
+
+/// Takes the bricks of these regions from another state of the world.
+fn take_regions(to: &mut WorldParts, regions: &[RegionPos], from: &WorldParts, grid: ChunkGrid) {
+    let is_meant = |pos: &BrickPos| regions.contains(&RegionPos::of(*pos));
+    let bricks = &mut to.change.bricks;
+    bricks.retain(|(pos, _)| !is_meant(pos));
+    bricks.extend(from.change.bricks.iter().filter(|(pos, _)| is_meant(pos)).cloned());
+    bricks.sort_by_key(|(pos, _)| *pos);
+    to.change.fit_fields(grid);
 }
 
 impl Findings {
@@ -165,13 +175,7 @@ pub(super) fn recover(
         let replayed = replay_good(empty, &GameData::new(), &before, &contents.named, false, &work)?;
         is_rebuilt = replayed.refused.is_none();
         if is_rebuilt {
-            let bricks = &mut parts.change.bricks;
-            let is_damaged = |pos: &BrickPos| damaged.contains(&RegionPos::of(*pos));
-            bricks.retain(|(pos, _)| !is_damaged(pos));
-            let others = replayed.terrain.parts().change.bricks.into_iter();
-            bricks.extend(others.filter(|(pos, _)| is_damaged(pos)));
-            bricks.sort_by_key(|(pos, _)| *pos);
-            parts.change.fit_fields(grid);
+            take_regions(&mut parts, &damaged, &replayed.terrain.parts(), grid);
         }
     }
     let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);

@@ -31,8 +31,7 @@ impl World {
 
     /// Checks that a map with a sample for each column is within the limits of images, before any memory is taken.
     pub(super) fn check_map_size(&self) -> Result<(), ImportError> {
-        let limits = ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() };
         let [width, depth] = [self.ground().width(), self.ground().depth()].map(|side| side as u32 + 1);
-        Ok(limits.check_image(width, depth, 4)?)
+        Ok(ImageLimits::check_sides(width, depth)?)
     }
 }

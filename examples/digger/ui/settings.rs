@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::player::bindings::Bindings;
 use crate::player::game_state::MenuPage;
 use crate::tools::aim::BuildShape;
+use crate::world::folders::user_folder;
 
 /// Fields that the file lacks get their defaults, and fields that are not known are ignored.
 #[derive(Resource, Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -144,16 +145,7 @@ pub struct SettingsFile(pub Option<PathBuf>);
 impl SettingsFile {
     /// The file in the user's configuration folder.
     pub fn of_user() -> Self {
-        let folder =
-            |name: &str| std::env::var_os(name).filter(|folder| !folder.is_empty()).map(PathBuf::from);
-        let settings = if cfg!(windows) {
-            folder("APPDATA")
-        } else if cfg!(target_os = "macos") {
-            folder("HOME").map(|home| home.join("Library/Application Support"))
-        } else {
-            folder("XDG_CONFIG_HOME").or_else(|| folder("HOME").map(|home| home.join(".config")))
-        };
-        Self(settings.map(|settings| settings.join("bevy_burrow").join("digger.json")))
+        Self(user_folder("XDG_CONFIG_HOME", ".config").map(|settings| settings.join("digger.json")))
     }
 }
 

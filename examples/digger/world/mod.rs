@@ -3,6 +3,7 @@
 pub mod air;
 pub mod day;
 pub mod debris;
+pub mod folders;
 pub mod landscape;
 pub mod light;
 pub mod particles;

@@ -30,7 +30,7 @@ impl ElevationGrid {
         height: u32,
         samples: Vec<f32>,
     ) -> Result<Self, ImportError> {
-        ImageLimits { max_alloc_bytes: u64::MAX, ..ImageLimits::default() }.check_image(width, height, 4)?;
+        ImageLimits::check_sides(width, height)?;
         let (expected, actual) = (u64::from(width) * u64::from(height), samples.len() as u64);
         if actual != expected {
             let unit = "samples";

@@ -6,6 +6,7 @@ use super::decoded::reserve;
 use super::error::ImportError;
 use super::grid::ElevationGrid;
 use super::report::ImportNote;
+use crate::ground::ImageLimits;
 
 /// A tile of a larger grid.
 #[derive(Clone, Debug)]
@@ -90,8 +91,7 @@ impl ElevationGrid {
         };
         let ((lefts, width), (tops, height)) = (starts(&widths), starts(&heights));
         let side = |side: u64| u32::try_from(side).unwrap_or(u32::MAX);
-        let limits = crate::ground::ImageLimits { max_alloc_bytes: u64::MAX, ..Default::default() };
-        limits.check_image(side(width), side(height), 4)?;
+        ImageLimits::check_sides(side(width), side(height))?;
         let mut samples = reserve(width * height)?;
         samples.resize((width * height) as usize, f32::NAN);
         // From the last tile on, so that of shared edges those of the left and upper tile stay.
@@ -227,7 +227,7 @@ fn lettered_numbers(stem: &str) -> Vec<(char, i32)> {
     stem.char_indices().filter(|(_, letter)| letter.is_alphabetic()).filter_map(number).collect()
 }
 
-/// The number at the end of a name, and what is before it; `None` if it is not separated from that.
+/// The number at the end of a name and the text before it, or `None` without a separator between them.
 fn last_number(stem: &str) -> Option<(i32, &str)> {
     let rest = stem.trim_end_matches(|digit: char| digit.is_ascii_digit());
     let (rest, start) = match rest.strip_suffix('-') {

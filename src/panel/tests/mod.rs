@@ -613,6 +613,13 @@ fn the_panel_is_larger_or_smaller_as_one_likes() {
     // Positions are those in the window.
     let larger = screen.places.0["Undo"];
     assert!((larger.min - 1.5 * place.min).length() < 1.0 && larger.width() > 1.4 * place.width());
+    for (key, is_larger) in [(egui::Key::Minus, false), (egui::Key::Plus, true), (egui::Key::Equals, true)] {
+        let before = screen.context.zoom_factor();
+        screen.press(key, Modifiers::CTRL | Modifiers::COMMAND);
+        screen.frame(Vec::new());
+        let now = screen.context.zoom_factor();
+        assert!(if is_larger { now > before } else { now < before }, "{key:?}: {before}, then {now}");
+    }
 }
 
 #[test]

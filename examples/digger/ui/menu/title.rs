@@ -16,8 +16,9 @@ use crate::player::game_state::{GameState, MenuPage};
 use crate::ui::images::Images;
 use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, GOLD, GREY};
+use crate::world::folders::{self, WorldsFolder};
 use crate::world::landscape::NewGame;
-use crate::world::saves::{self, PlayedWorld, WorldsFolder};
+use crate::world::saves::PlayedWorld;
 
 /// Seconds for one turn around the landscape.
 const TURN: f32 = 150.0;
@@ -33,7 +34,7 @@ impl Plugin for TitlePlugin {
             .add_observer(|_: On<NewGame>, mut game: ResMut<Start>| game.has_begun = false)
             .add_systems(
                 OnEnter(GameState::Title),
-                // What ended the game may be told.
+                // The page that says why the game ended stays.
                 (|mut page: ResMut<NextState<MenuPage>>| page.set(MenuPage::Menu))
                     .run_if(not(in_state(MenuPage::Question))),
             )
@@ -97,7 +98,7 @@ fn open(
         left.spawn((widgets::text(texts::TAGLINE, 17.0, GREY), below));
         let saves_worlds = worlds.0.is_some();
         let first = match played.open(&party) {
-            Some(folder) => texts::continue_world(&saves::name(folder)),
+            Some(folder) => texts::continue_world(&folders::name(folder)),
             None if game.has_begun => texts::CONTINUE.into(),
             None => texts::PLAY.into(),
         };

@@ -11,7 +11,8 @@ use crate::player::game_state::MenuPage;
 use crate::ui::settings::Settings;
 use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, GREY, RED};
-use crate::world::saves::{self, PlayedWorld, WorldsFolder};
+use crate::world::folders::WorldsFolder;
+use crate::world::saves::{self, PlayedWorld};
 
 /// Width of the rows.
 const WIDTH: f32 = 520.0;

@@ -17,8 +17,9 @@ use crate::player::game_state::{GameState, MenuPage};
 use crate::ui::hud::Hint;
 use crate::ui::texts;
 use crate::ui::widgets::{self, Activated, Adjusted, Arrow, GREY, MenuInputDisabled, WHITE};
+use crate::world::folders::{self, FoundWorld, WorldsFolder};
 use crate::world::landscape::NewGame;
-use crate::world::saves::{self, FoundWorld, NotOpened, PlayedWorld, WorldsFolder};
+use crate::world::saves::{NotOpened, PlayedWorld};
 use crate::world::thumbnails;
 
 /// Width of the buttons.
@@ -87,9 +88,9 @@ fn refuse(
         return;
     };
     played.0 = None;
-    let text = match saves::is_closed(&folder) {
-        true => texts::not_opened(&saves::name(&folder), why),
-        false => texts::is_open(&saves::name(&folder)),
+    let text = match folders::is_closed(&folder) {
+        true => texts::not_opened(&folders::name(&folder), why),
+        false => texts::is_open(&folders::name(&folder)),
     };
     give_up(&mut commands, text);
 }
@@ -164,13 +165,13 @@ fn slot(at: usize, world: &FoundWorld, is_played: bool, picture: Option<Handle<I
     let minutes = world.saved.elapsed().map_or(0, |passed| passed.as_secs() / 60);
     let open = match is_played {
         true => texts::CURRENT,
-        false if saves::is_closed(&world.folder) => "",
+        false if folders::is_closed(&world.folder) => "",
         false => texts::OPEN_ELSEWHERE,
     };
     let saved = format!("{}{open}", texts::ago(minutes));
     let words = (
         Node { flex_grow: 1.0, overflow: Overflow::clip(), ..widgets::column(px(2)) },
-        children![widgets::text(saves::name(&world.folder), 20.0, WHITE), widgets::text(saved, 14.0, GREY)],
+        children![widgets::text(folders::name(&world.folder), 20.0, WHITE), widgets::text(saved, 14.0, GREY)],
     );
     let around =
         Node { padding: UiRect::axes(px(12), px(8)), border_radius: BorderRadius::all(px(4)), ..default() };
@@ -181,7 +182,7 @@ fn slot(at: usize, world: &FoundWorld, is_played: bool, picture: Option<Handle<I
 
 /// The page of one world. Its name is typed, and kept when the page is left.
 fn open_world(mut commands: Commands, chosen: Res<Chosen>, mut draft: ResMut<Draft>) {
-    draft.name = saves::name(&chosen.0);
+    draft.name = folders::name(&chosen.0);
     spawn_page(&mut commands, MenuPage::World, texts::WORLD, WIDTH + 54.0, |column| {
         spawn_field(column, 0, texts::WORLD_NAME, Field::WorldName, WIDTH);
         let folder = chosen.0.clone();
@@ -220,13 +221,13 @@ fn rename(
     mut commands: Commands,
 ) {
     let Some(folder) = chosen.map(|chosen| chosen.0.clone()).filter(|folder| folder.exists()) else { return };
-    let name = saves::name(&folder);
+    let name = folders::name(&folder);
     if draft.name == name {
         return;
     }
-    if played.open(&party) != Some(&folder) && !saves::is_closed(&folder) {
+    if played.open(&party) != Some(&folder) && !folders::is_closed(&folder) {
         question::tell(&mut commands, MenuPage::Worlds, texts::is_open(&name));
-    } else if let Err(why) = saves::rename(&folder, &draft.name) {
+    } else if let Err(why) = folders::rename(&folder, &draft.name) {
         question::tell(&mut commands, MenuPage::Worlds, texts::failed(texts::WORLD_NAME, why));
     }
 }
@@ -262,11 +263,11 @@ fn change(
             Some(done) => done.map_err(|why| texts::failed(&change.folder.display().to_string(), why)),
             None => return,
         },
-        None if saves::is_closed(&change.folder) => {
+        None if folders::is_closed(&change.folder) => {
             let (folder, copy) = (change.folder.clone(), change.copy.clone());
             change.task = Some(IoTaskPool::get().spawn(async move {
                 match copy {
-                    Some(name) => saves::duplicate(&folder, &name),
+                    Some(name) => folders::duplicate(&folder, &name),
                     None => std::fs::remove_dir_all(&folder),
                 }
             }));
@@ -276,7 +277,7 @@ fn change(
             change.waited += time.delta();
             return;
         }
-        None => Err(texts::is_open(&saves::name(&change.folder))),
+        None => Err(texts::is_open(&folders::name(&change.folder))),
     };
     commands.remove_resource::<Change>();
     commands.remove_resource::<MenuInputDisabled>();

@@ -99,7 +99,7 @@ fn a_world_that_is_open_in_another_window_is_neither_played_renamed_nor_deleted(
     let folder = std::env::temp_dir().join(format!("digger_elsewhere_{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
     let _lock = lock(&folder);
-    let text = texts::is_open(&saves::name(&folder));
+    let text = texts::is_open(&folders::name(&folder));
     let mut app = app(MenuPage::Menu);
     app.world_mut().spawn((Window::default(), PrimaryWindow));
     app.insert_resource(Chosen(folder.clone()));
@@ -121,7 +121,7 @@ fn a_world_that_is_open_in_another_window_is_neither_played_renamed_nor_deleted(
     app.world_mut().resource_mut::<Draft>().name = "mine".into();
     go_to(&mut app, MenuPage::Worlds);
     is_told(&mut app);
-    assert_ne!(saves::name(&folder), "mine");
+    assert_ne!(folders::name(&folder), "mine");
 
     go_to(&mut app, MenuPage::Worlds);
     app.insert_resource(Change { folder: folder.clone(), ..default() });
@@ -179,10 +179,10 @@ fn the_world_that_is_played_is_copied_under_its_new_name_and_played_on() {
         app.world_mut().resource_mut::<Draft>().name = "Mound".into();
         click(&mut app, COPY);
         update_until(&mut app, "the list", |app| page(app) == MenuPage::Worlds);
-        assert_eq!(saves::name(&folder), "Mound");
-        assert_eq!(saves::name(&all.0.join("Mound copy")), "Mound copy");
+        assert_eq!(folders::name(&folder), "Mound");
+        assert_eq!(folders::name(&all.0.join("Mound copy")), "Mound copy");
         assert_eq!(app.world().resource::<PlayedWorld>().0.as_ref(), Some(&folder));
-        // A guest's own world is closed, and its host's goes on.
+        // A guest's own world is closed, and its host's continues.
         let (after, games) = if party == guest() { (guest(), 0) } else { (Party::Alone, 2) };
         assert_eq!(*app.world().resource::<Party>(), after);
         assert_eq!(app.world().resource::<NewGames>().0, games, "{party:?}");
@@ -250,7 +250,7 @@ fn a_connection_that_fails_leads_to_the_title_and_is_told() {
     );
     assert!(words(&mut app).contains(&"the host has gone".into()));
     assert_eq!(*app.world().resource::<Party>(), Party::Alone);
-    assert!(!app.world().resource::<Start>().is_wanted, "nothing starts by itself");
+    assert!(!app.world().resource::<Start>().is_wanted, "nothing starts without the player");
     assert_eq!(app.world().resource::<NewGames>().0, 1);
 }
 

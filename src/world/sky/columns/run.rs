@@ -10,7 +10,7 @@ pub(in crate::world::sky) struct Run {
 }
 
 impl Run {
-    /// An empty run whose ends are so far apart that it stays empty wherever it is moved.
+    /// An empty run. Its ends are half the range apart, so it stays empty wherever it is moved.
     pub const EMPTY: Self = Self { start: i32::MAX / 2, end: i32::MIN / 2 };
 
     pub fn is_empty(self) -> bool {
