@@ -3,7 +3,7 @@
 use bevy::ecs::component::{Component, ComponentId, Mutable, RequiredComponentsRegistrator, StorageType};
 use bevy::prelude::*;
 
-use super::places::TerrainPlace;
+use super::entities::places::TerrainPlace;
 use crate::lattice::{ChunkPos, TilePos};
 use crate::lod::Node;
 use crate::terrain::{Order, Terrain};

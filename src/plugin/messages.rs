@@ -7,8 +7,7 @@ use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
 use super::MaterialColors;
-use super::meshes::MeshBuilder;
-use super::vertex_kind::{VertexExtras, VertexKind};
+use super::meshes::{MeshBuilder, VertexExtras, VertexKind};
 use crate::brush::Brush;
 use crate::terrain::{LoosePiece, Receipt, ReturnedPiece, Terrain};
 

@@ -21,51 +21,26 @@
 //! A [`SurfaceProcessor`] builds extra data for each surface off-thread, and swaps it in with the mesh. Figures are in
 //! [`BurrowFigures`], and in Bevy's [`diagnostics`]; transactions, edits, meshes, commits and loads have tracing spans.
 
-mod collect;
-mod commit;
+// Files with reflected types, assets and loaders stay in this folder: scenes and `.meta` files name those by the path
+// of their module.
 mod components;
 pub mod diagnostics;
-mod display;
-mod engine;
 mod entities;
 mod figures;
-mod ground_depth;
 #[cfg(feature = "format")]
 mod ground_file;
 pub mod heightmap;
-mod inbox;
-mod load;
-mod lod;
 mod lod_state;
-#[cfg(feature = "render")]
-mod materials;
 mod meshes;
 pub mod messages;
-mod new_mesh;
-mod outdated;
-mod palettes;
 #[cfg(feature = "picking")]
 mod picking;
-mod places;
-mod processor;
-mod propagate;
 mod query;
-mod redraw;
 mod reports;
-mod same_frame;
+mod schedule;
 mod settings;
-#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
-#[cfg_attr(
-    not(any(feature = "scatter", feature = "landmass")),
-    allow(dead_code, reason = "colliders need only some of it")
-)]
-mod squares;
-mod task;
 mod times;
-mod vertex_kind;
 
-#[cfg(any(feature = "scatter", feature = "landmass"))]
-pub(crate) use commit::GroundChanged;
 pub use components::{
     Chunk, EditOutbox, Field, GroundPiece, Held, MaterialColors, SkyLight, SlimVertices, Tile,
 };
@@ -73,6 +48,19 @@ pub use components::{
 pub use components::{GroundPieces, MeshBytes, ShownSurface};
 #[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
 pub(crate) use entities::TerrainEntities;
+#[cfg(feature = "render")]
+pub(crate) use entities::materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
+#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
+pub(crate) use entities::places::Places;
+#[cfg(any(feature = "scatter", feature = "landmass", feature = "debug", feature = "egui"))]
+pub(crate) use entities::places::voxel_metres;
+pub use entities::propagate::TerrainPropagatePlugin;
+#[cfg(feature = "render")]
+pub(crate) use entities::propagate::{Inherited, remove_inherited};
+#[cfg(feature = "avian")]
+pub(crate) use entities::squares::squares_within;
+#[cfg(any(feature = "scatter", feature = "landmass"))]
+pub(crate) use entities::squares::{Squares, are_same, position_on};
 #[cfg(feature = "avian")]
 pub(crate) use entities::trigger_if_alive;
 pub use figures::BurrowFigures;
@@ -94,8 +82,12 @@ pub use heightmap::{HeightmapLoader, HeightmapPlugin};
 pub(crate) use heightmap::{read_limited, register_loader};
 pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
-#[cfg(feature = "render")]
-pub(crate) use materials::{propagate_look, propagate_material, warn_of_textures, warn_of_undrawn};
+#[doc(hidden)]
+pub use meshes::CUT_VOXELS;
+pub use meshes::{
+    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
+};
+pub use meshes::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 #[doc(hidden)]
 pub use messages::{
     BrushApplied, ChunkChanged, ChunkCreated, FieldChanged, FieldCreated, FieldMerged, HistoryMoved,
@@ -103,33 +95,20 @@ pub use messages::{
 };
 #[cfg(feature = "picking")]
 pub use picking::TerrainPickingPlugin;
-#[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
-pub(crate) use places::Places;
-#[cfg(any(feature = "scatter", feature = "landmass", feature = "debug", feature = "egui"))]
-pub(crate) use places::voxel_metres;
-pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
-pub use propagate::TerrainPropagatePlugin;
-#[cfg(feature = "render")]
-pub(crate) use propagate::{Inherited, remove_inherited};
 pub use query::{TerrainHit, Terrains};
-pub use redraw::Redraw;
-pub(crate) use same_frame::CommitSameFrame;
-pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
-#[cfg(feature = "avian")]
-pub(crate) use squares::squares_within;
 #[cfg(any(feature = "scatter", feature = "landmass"))]
-pub(crate) use squares::{Squares, are_same, position_on};
+pub(crate) use schedule::commit::GroundChanged;
+pub use schedule::redraw::Redraw;
+pub(crate) use schedule::same_frame::CommitSameFrame;
+pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
 #[doc(hidden)]
 pub use times::Times;
-#[doc(hidden)]
-pub use vertex_kind::CUT_VOXELS;
-pub use vertex_kind::{
-    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
-};
 
 use bevy::ecs::reflect::ReflectMessage;
 use bevy::prelude::*;
 
+use self::entities::{places, propagate};
+use self::schedule::{collect, commit, engine, inbox, load, lod, outdated, redraw, same_frame, task};
 use crate::brush::Brush;
 pub use crate::threads::ThreadSettings;
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::Xxh3;
 
 use super::error::StoreError;
-use super::region::Region;
+use super::regions::Region;
 use crate::format::level::Level;
 use crate::format::portable::SavedRegion;
 use crate::format::region::region_key;

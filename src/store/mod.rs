@@ -1,53 +1,27 @@
 //! Worlds on disk: a journal of commits, checkpoints of regions, recovery after a crash.
 
 mod base_level;
-mod checkpoint;
-mod checkpoint_copy;
-mod checkpointing;
-mod choose_checkpoint;
-mod closing;
-mod contents;
-mod database;
-#[cfg(any(test, feature = "tools"))]
-mod disk;
+mod checkpoints;
 mod error;
 mod files;
-mod found;
-mod ground_size;
 mod inspect;
 mod journal;
-mod keys;
 mod levels;
-mod load_regions;
-mod message;
-mod mirror;
 mod open_store;
 mod options;
 mod portable;
 mod progress;
-mod quarantine;
-mod reading;
-mod recover;
-mod region;
-mod region_file;
-mod replace;
-mod replay_log;
-mod salvage;
-mod segment;
-mod settle;
-mod shared;
-mod sources;
-mod unsaved;
-mod writer;
+mod recovery;
+mod regions;
+mod store_thread;
 
 pub use base_level::BaseLevel;
 #[doc(hidden)]
 pub use base_level::LevelName;
-pub use closing::ClosingStore;
+pub use error::{StoreError, StoreWarning, WorldSize};
 #[cfg(any(test, feature = "tools"))]
 #[doc(hidden)]
-pub use disk::{DiskFault, DiskImage, SimulatedDisk};
-pub use error::{StoreError, StoreWarning, WorldSize};
+pub use files::{DiskFault, DiskImage, SimulatedDisk};
 #[doc(hidden)]
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
 pub use inspect::{WorldCheck, WorldInfo, check, inspect};
@@ -60,4 +34,4 @@ pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
 pub use portable::{Imported, from_bytes, to_bytes};
 pub use progress::Progress;
-pub use shared::SavePoint;
+pub use store_thread::{ClosingStore, SavePoint};

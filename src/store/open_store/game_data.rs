@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::Store;
-use crate::store::shared::{GameChange, apply_game};
+use crate::store::store_thread::{GameChange, apply_game};
 
 impl Store {
     /// Stores data of the game under a key, such as an inventory or the time of day. It becomes durable together with

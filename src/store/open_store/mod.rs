@@ -16,24 +16,21 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::Duration;
 
-use super::closing::{ClosingStore, StoreThread};
-use super::database::DATABASE;
-use super::error::{StoreError, StoreWarning, WorldSize};
-use super::files::{Files, Folder, Lock};
-use super::found::Contents;
-use super::message::{Content, Message};
-use super::mirror::Mirror;
-use super::options::StoreOptions;
-use super::progress::{Progress, Work};
-use super::recover::recover;
-use super::region_file::RegionFile;
-use super::settle::settle;
-use super::shared::{GameData, SavePoint, Shared};
-use super::sources::has_world;
-use super::unsaved;
-use super::writer::Writer;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
+use crate::store::checkpoints::Mirror;
+use crate::store::error::{StoreError, StoreWarning, WorldSize};
+use crate::store::files::{Files, Folder, Lock};
+use crate::store::journal::unsaved;
+use crate::store::options::StoreOptions;
+use crate::store::progress::{Progress, Work};
+use crate::store::recovery::{Contents, recover, settle};
+use crate::store::regions::RegionFile;
+use crate::store::regions::database::DATABASE;
+use crate::store::regions::sources::has_world;
+use crate::store::store_thread::{
+    ClosingStore, Content, GameData, Message, SavePoint, Shared, StoreThread, Writer,
+};
 use crate::terrain::{CommitRecord, EditSettings, LogEntry, Patch, Terrain, TerrainSettings, Version};
 
 /// The file that is locked while a world is open.

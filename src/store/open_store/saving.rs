@@ -5,8 +5,7 @@ use std::time::Duration;
 
 use super::{LOG_BYTES, Store};
 use crate::store::error::{StoreError, WorldSize};
-use crate::store::message::{Answer, Content, Given, Message};
-use crate::store::shared::SavePoint;
+use crate::store::store_thread::{Answer, Content, Given, Message, SavePoint};
 use crate::terrain::{CommitRecord, Terrain};
 
 impl Store {
