@@ -45,6 +45,9 @@ const MODULES: &[&str] = &[
 const SHOWN_NAMES: usize = 380;
 const TERRAIN_FUNCTIONS: usize = 37;
 
+/// The most files that lie side by side in a folder of `src`. Lower it when the largest folder is divided.
+const FILES_OF_A_FOLDER: usize = 29;
+
 /// The text of a crate's files, by path below `src`.
 type Sources = BTreeMap<String, String>;
 
@@ -390,6 +393,30 @@ fn library() -> Sources {
 
 fn crate_of(files: &[(&str, &str)]) -> Sources {
     files.iter().map(|(path, text)| ((*path).to_owned(), (*text).to_owned())).collect()
+}
+
+/// The folders with more files side by side than this, and how many they have.
+fn crowded_folders(sources: &Sources, most: usize) -> BTreeMap<&str, usize> {
+    let mut files = BTreeMap::new();
+    for (folder, _) in sources.keys().filter_map(|path| path.rsplit_once('/')) {
+        *files.entry(folder).or_default() += 1;
+    }
+    files.retain(|_, count| *count > most);
+    files
+}
+
+#[test]
+fn no_folder_is_crowded() {
+    let mut sources = library();
+    let found = crowded_folders(&sources, FILES_OF_A_FOLDER);
+    assert!(found.is_empty(), "these folders have more than {FILES_OF_A_FOLDER} files: {found:?}");
+    // That many more files in a folder are too many. A folder below another one is counted separately.
+    for index in 0..FILES_OF_A_FOLDER {
+        sources.insert(format!("store/new{index}.rs"), String::new());
+        sources.insert(format!("lod/new/{index}.rs"), String::new());
+    }
+    let crowded = crowded_folders(&sources, FILES_OF_A_FOLDER);
+    assert_eq!(crowded.keys().copied().collect::<Vec<_>>(), ["store"]);
 }
 
 /// The modules whose tests use Bevy, as filters of tests name them.
