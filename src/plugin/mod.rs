@@ -19,12 +19,12 @@
 //! [`Terrain`]: crate::terrain::Terrain
 //!
 //! A [`SurfaceProcessor`] builds extra data for each surface off-thread, and swaps it in with the mesh. Figures are in
-//! [`BurrowFigures`], and in Bevy's [`diagnostics`]; transactions, edits, meshes, commits and loads have tracing spans.
+//! [`BurrowFigures`], and in Bevy's diagnostics; transactions, edits, meshes, commits and loads have tracing spans.
 
 mod collect;
 mod commit;
 mod components;
-pub mod diagnostics;
+mod diagnostics;
 mod display;
 mod engine;
 mod entities;
@@ -123,9 +123,6 @@ pub(crate) use squares::{Squares, are_same, position_on};
 pub use times::Times;
 #[doc(hidden)]
 pub use vertex_kind::CUT_VOXELS;
-pub use vertex_kind::{
-    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
-};
 
 use bevy::ecs::reflect::ReflectMessage;
 use bevy::prelude::*;
