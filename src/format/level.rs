@@ -17,7 +17,7 @@ use super::portable::{SavedRegion, by_region, of_regions};
 use super::region::region_key;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{EditSettings, LooseSettings, SIMULATION, TerrainSettings, WorldParts};
+use crate::terrain::{EditSettings, LooseSettings, Terrain, TerrainSettings, WorldParts};
 use crate::volume::DiggingRules;
 
 /// The file that describes a level.
@@ -106,7 +106,7 @@ pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
 pub(super) fn write_within(level: &Level, limits: &Limits) -> Result<LevelFiles, FormatError> {
     let description = Description {
         burrow_level: frame::PLAIN,
-        simulation: SIMULATION,
+        simulation: Terrain::SIMULATION,
         settings: level.settings,
         ground: format!("{:016x}", level.ground),
         next_field: level.next_field,

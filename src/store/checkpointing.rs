@@ -17,7 +17,7 @@ use crate::format;
 use crate::format::change::put_change;
 use crate::format::frame::{self, Kind};
 use crate::lattice::RegionPos;
-use crate::terrain::SIMULATION;
+use crate::terrain::Terrain;
 
 /// The share of opening after which regions are encoded.
 const SAVED: f32 = 0.97;
@@ -118,7 +118,7 @@ impl Writer {
             hash: *hash,
             next_field: *next_field,
             edit_settings: edit_settings.clone(),
-            simulation: SIMULATION,
+            simulation: Terrain::SIMULATION,
             ground: self.ground.hash(),
             game,
         }

@@ -31,7 +31,7 @@ pub struct WorldInfo {
     pub hash: u64,
     /// The sizes of its chunks and voxels.
     pub settings: TerrainSettings,
-    /// The [`SIMULATION`](crate::terrain::SIMULATION) that saved it.
+    /// The [`Terrain::SIMULATION`](crate::terrain::Terrain::SIMULATION) that saved it.
     pub simulation: u32,
     /// Hash of its ground.
     pub ground: u64,

@@ -8,7 +8,7 @@ use crate::format::frame::WorldId;
 use crate::format::portable::{PortableWorld, read_portable, write_portable};
 use crate::format::{FormatError, Metadata};
 use crate::ground::Ground;
-use crate::terrain::{SIMULATION, Terrain, TerrainSettings};
+use crate::terrain::{Terrain, TerrainSettings};
 
 /// Converts a terrain's world to bytes, with the game's data by key. Equal worlds under one id give equal bytes.
 /// Neither the ground nor history are part of it.
@@ -25,7 +25,7 @@ pub fn to_bytes(
     let metadata = Metadata {
         settings: TerrainSettings { chunk_size: parts.chunk_size, voxel_size: terrain.voxel_size() },
         hash: terrain.world().hash(),
-        simulation: SIMULATION,
+        simulation: Terrain::SIMULATION,
         ground: ground.hash(),
         game: game.iter().map(|(key, bytes)| (key.clone(), bytes.clone())).collect(),
         ..Metadata::default()
@@ -56,7 +56,7 @@ pub fn from_bytes(bytes: &[u8], ground: impl Into<Arc<Ground>>) -> Result<Import
     let portable = read_portable(bytes, &ground)?;
     let metadata = &portable.metadata;
     let is_base_changed = metadata.ground != ground.hash();
-    let (hash, is_known) = (metadata.hash, !is_base_changed && metadata.simulation == SIMULATION);
+    let (hash, is_known) = (metadata.hash, !is_base_changed && metadata.simulation == Terrain::SIMULATION);
     let terrain = Terrain::restore(ground, &metadata.settings, portable.parts())?;
     if is_known && terrain.world().hash() != hash {
         return Err(StoreError::Unreadable("it has another hash than it says".into()));

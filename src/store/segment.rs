@@ -18,7 +18,7 @@ use crate::format::frame::{self, Kind, WorldId};
 use crate::format::ids::ContentId;
 use crate::format::{Batch, FormatError};
 use crate::ground::Ground;
-use crate::terrain::SIMULATION;
+use crate::terrain::Terrain;
 
 /// The folder of segments, and of the content that they name.
 pub(super) use super::contents::FOLDER;
@@ -69,7 +69,7 @@ fn key(frame: u64) -> [u8; 8] {
 pub(super) fn base(ground: u64, level: Option<&LevelName>) -> u64 {
     let level = level.map_or(0, |level| level.hash.rotate_left(1));
     // Any odd number keeps simulations apart.
-    ground ^ level ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    ground ^ level ^ u64::from(Terrain::SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
 /// An entry of a segment.

@@ -75,7 +75,7 @@ pub(crate) use pending_display::PendingDisplay;
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
 pub use receipt::{Applied, Asked, ChunkScenario, Receipt, Rejection, ScenarioCounts};
-pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
+pub use record::{CommitRecord, LogEntry, WorldParts};
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]
 pub use resolve::FieldChange;

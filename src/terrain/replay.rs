@@ -45,7 +45,7 @@ pub enum ReplayError {
         found: u64,
     },
     /// The world has another hash than the record says: it is another world, or the record was written by a version of
-    /// the crate with another [`SIMULATION`](super::SIMULATION).
+    /// the crate with another [`Terrain::SIMULATION`].
     #[error("revision {revision} has the hash {found:#018x} here, but {expected:#018x} in the record")]
     Hash {
         /// The record's revision.

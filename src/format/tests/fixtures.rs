@@ -11,7 +11,7 @@ use crate::format::level::{LEVEL_JSON, Level, LevelFiles, read_level, write_leve
 use crate::format::portable::{PortableWorld, read_portable, write_portable};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::LatticeBox;
-use crate::terrain::{LooseSettings, SIMULATION, Terrain, TerrainSettings};
+use crate::terrain::{LooseSettings, Terrain, TerrainSettings};
 use crate::volume::DiggingRules;
 
 fn folder() -> PathBuf {
@@ -48,7 +48,7 @@ fn world() -> Terrain {
     terrain
 }
 
-/// The [`SIMULATION`] of the stored files; those of later ones have the same form.
+/// The [`Terrain::SIMULATION`] of the stored files; those of later ones have the same form.
 const STORED_SIMULATION: u32 = 1;
 
 fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
@@ -62,8 +62,8 @@ fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
     let json = files.get_mut(LEVEL_JSON).expect("each level has one");
     let line = |simulation: u32| format!("\"simulation\": {simulation},");
     let text = String::from_utf8(std::mem::take(json)).expect("JSON is text");
-    assert!(text.contains(&line(SIMULATION)));
-    *json = text.replacen(&line(SIMULATION), &line(STORED_SIMULATION), 1).into_bytes();
+    assert!(text.contains(&line(Terrain::SIMULATION)));
+    *json = text.replacen(&line(Terrain::SIMULATION), &line(STORED_SIMULATION), 1).into_bytes();
     (portable, file, files)
 }
 

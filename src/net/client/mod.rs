@@ -35,7 +35,7 @@ use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{Order, Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
+use crate::terrain::{Order, Patch, Receipt, Rejection, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
@@ -226,7 +226,7 @@ impl Client {
         self.greeted = self.now;
         let hello = Hello {
             protocol: PROTOCOL,
-            simulation: SIMULATION,
+            simulation: Terrain::SIMULATION,
             ground: self.replica.world().ground().hash(),
             chunk_size: self.chunk_size,
             // A part of a world has no number: the server determines what is missing.
