@@ -9,7 +9,7 @@ use super::error::{StoreError, StoreWarning};
 use super::files::{Files, Folder};
 use super::found::Contents;
 use super::keys;
-use super::open_store::read;
+use super::open_store::{Store, read};
 use super::options::{BaseChanged, StoreOptions};
 use super::recover::recover;
 use super::replay_log::replay_all;
@@ -57,12 +57,27 @@ pub struct WorldInfo {
     pub damage: Vec<String>,
 }
 
-/// Reads facts about the world in a folder, without its ground.
-///
-/// # Errors
-/// When there is none, when it is open, and when nothing of it can be read.
-pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
-    inspect_in(&Folder::new(folder.as_ref()))
+impl Store {
+    /// Reads facts about the world in a folder, without its ground.
+    ///
+    /// # Errors
+    /// When there is none, when it is open, and when nothing of it can be read.
+    pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
+        inspect_in(&Folder::new(folder.as_ref()))
+    }
+
+    /// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the
+    /// journal's tail, and, if it is whole, the log from the first commit on.
+    ///
+    /// # Errors
+    /// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
+    pub fn check(
+        folder: impl AsRef<Path>,
+        ground: impl Into<Arc<Ground>>,
+        level: Option<&BaseLevel>,
+    ) -> Result<WorldCheck, StoreError> {
+        check_in(&Folder::new(folder.as_ref()), ground, level)
+    }
 }
 
 /// Inspects a world in other [files](Files).
@@ -160,19 +175,6 @@ pub struct WorldCheck {
     pub replays: Option<bool>,
 }
 
-/// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the
-/// journal's tail, and, if it is whole, the log from the first commit on.
-///
-/// # Errors
-/// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
-pub fn check(
-    folder: impl AsRef<Path>,
-    ground: impl Into<Arc<Ground>>,
-    level: Option<&BaseLevel>,
-) -> Result<WorldCheck, StoreError> {
-    check_in(&Folder::new(folder.as_ref()), ground, level)
-}
-
 /// Checks a world in other [files](Files).
 ///
 /// # Errors
@@ -189,7 +191,7 @@ pub fn check_in(
 /// its log from the first commit on.
 ///
 /// # Errors
-/// As for [`check`].
+/// As for [`Store::check`].
 pub fn read_world(
     folder: impl AsRef<Path>,
     ground: impl Into<Arc<Ground>>,

@@ -50,14 +50,14 @@ pub use disk::{DiskFault, DiskImage, SimulatedDisk};
 pub use error::{StoreError, StoreWarning, WorldSize};
 #[doc(hidden)]
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
-pub use inspect::{WorldCheck, WorldInfo, check, inspect};
+pub use inspect::{WorldCheck, WorldInfo};
 #[doc(hidden)]
 pub use inspect::{check_in, inspect_in, read_world, replay};
+pub use levels::RestoreLevelError;
 #[doc(hidden)]
 pub use levels::read_level_files;
-pub use levels::{RestoreLevelError, load_level, save_level};
 pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
-pub use portable::{Imported, from_bytes, to_bytes};
+pub use portable::WorldFile;
 pub use progress::Progress;
 pub use shared::SavePoint;
