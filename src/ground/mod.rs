@@ -57,7 +57,7 @@ pub use image_heights::{Detail, ImageScale};
 pub use import::{
     ElevationGrid, ElevationScale, ElevationTile, HeightFormat, HeightScale, IdOptions, ImportError,
     ImportNote, ImportOptions, ImportReport, MAX_LAYERS, MaterialNote, MaterialReport, RawLayout, Repair,
-    SampleKind, SplatOptions, TileEdges, tile_place,
+    SampleKind, SplatOptions, TileEdges,
 };
 #[doc(hidden)]
 pub use material::OVERLAY_DEPTH;
