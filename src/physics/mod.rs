@@ -22,7 +22,7 @@
 //! | --- | --- |
 //! | ground to stand on | [`TerrainPhysicsPlugin`], and a [`ColliderSource`] on everything that moves about |
 //! | a first-person body | [`Character`], steered by [`CharacterSteering`], moved by [`CharacterPlugin`] |
-//! | ground that breaks off and falls | [`DebrisPlugin`], and `LooseGround` on the terrain; [`debris_collider`] for bodies of your own |
+//! | ground that breaks off and falls | [`DebrisPlugin`], and `LooseSettings` on the terrain; [`debris_collider`] for bodies of your own |
 //! | finding the terrain of a collider that was hit | [`GroundBody`] on the collider's entity |
 //! | live figures | [`PhysicsFigures`] |
 //! | bodies that cannot leave the terrain | [`EdgeWalls`] on the terrain |

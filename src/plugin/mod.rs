@@ -7,7 +7,7 @@
 //! everything but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages work by whole strokes, and are answered by [`HistoryMoved`]. On terrains with
-//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`]
+//! [`LooseSettings`](crate::terrain::LooseSettings), a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`]
 //! for each that an undo brings back.
 //!
 //! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`],
@@ -114,7 +114,7 @@ pub(crate) use propagate::{Inherited, remove_inherited};
 pub use query::{TerrainHit, Terrains};
 pub use redraw::Redraw;
 pub(crate) use same_frame::CommitSameFrame;
-pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
+pub use settings::{BurrowEngine, BurrowSettings};
 #[cfg(feature = "avian")]
 pub(crate) use squares::squares_within;
 #[cfg(any(feature = "scatter", feature = "landmass"))]
