@@ -246,7 +246,7 @@
 //! | `threads` | thread pools of the plugin |
 //! | [`lattice`], [`lod`], [`ground`] | coordinates, levels of detail, the pristine world |
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
-//! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
+//! | [`surface`], `dense` | marching cubes, heightmap and their seam; a mesher of plain arrays |
 //! | [`backend`] | engines on CPU and GPU |
 //! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
 //! | [`terrain`] | orders, transactions, history, the commit log; exports what the three above have for games |
@@ -355,6 +355,7 @@ pub mod backend;
 pub mod brush;
 #[cfg(feature = "debug")]
 pub mod debug;
+#[doc(hidden)]
 pub mod dense;
 mod edits;
 #[cfg(feature = "format")]

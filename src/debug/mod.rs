@@ -35,6 +35,8 @@ mod views;
 mod walkable;
 mod wires;
 
-pub use plugin::{BurrowDebugPlugin, DebugLines};
+pub use plugin::BurrowDebugPlugin;
+#[doc(hidden)]
+pub use plugin::DebugLines;
 pub use settings::{BurrowDebug, DebugView};
 pub use wires::SeamWires;

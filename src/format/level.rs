@@ -34,12 +34,15 @@ pub struct Level {
     /// The [hash](Ground::hash) of the ground that it was made on.
     pub ground: u64,
     /// The greatest name that a field has had.
+    #[doc(hidden)]
     pub next_field: u64,
     /// The rules and the search for loose pieces that edits obey.
+    #[doc(hidden)]
     pub edit_settings: EditSettings,
     /// The game's data, by key.
     pub game: BTreeMap<String, Vec<u8>>,
     /// Regions that hold anything; their revisions are 0.
+    #[doc(hidden)]
     pub regions: BTreeMap<RegionPos, SavedRegion>,
 }
 
@@ -61,6 +64,7 @@ struct Description {
 
 impl Level {
     /// A level of the parts of a world over this ground.
+    #[doc(hidden)]
     pub fn new(parts: WorldParts, voxel_size: f32, game: BTreeMap<String, Vec<u8>>, ground: &Ground) -> Self {
         let WorldParts { change, chunk_size, edit_settings, .. } = parts;
         let (settings, next_field) = (TerrainSettings { chunk_size, voxel_size }, change.next_field);
@@ -69,6 +73,7 @@ impl Level {
     }
 
     /// The level's parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
+    #[doc(hidden)]
     pub fn parts(&self) -> WorldParts {
         let change = of_regions(&self.regions, self.next_field);
         let (chunk_size, edit_settings) = (self.settings.chunk_size, self.edit_settings.clone());

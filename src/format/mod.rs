@@ -49,6 +49,7 @@ pub use ids::WorldId;
 pub use level::Level;
 #[doc(hidden)]
 pub use level::LevelFiles;
+#[doc(hidden)]
 pub use metadata::Metadata;
 #[doc(hidden)]
 pub use portable::{PortableHead, SavedRegion, read_portable_head};

@@ -78,7 +78,9 @@ pub use collider_source::ColliderSource;
 #[doc(hidden)]
 pub use debris::{Debris, DebrisCrumbled, DebrisOf, DebrisPlugin, DebrisSettings, TerrainDebris};
 pub use edge_walls::EdgeWalls;
-pub use ground::{GroundBody, GroundCollider, GroundContact, TerrainContact, TerrainPhysicsDisabled};
+#[doc(hidden)]
+pub use ground::GroundCollider;
+pub use ground::{GroundBody, GroundContact, TerrainContact, TerrainPhysicsDisabled};
 pub use hold::HeldByGround;
 #[doc(hidden)]
 pub use hull::debris_collider;

@@ -102,6 +102,7 @@ pub use messages::{
     LoosePieceFound, LoosePieceReturned, Redo, TargetedBrush, TerrainReady, Undo,
 };
 #[cfg(feature = "picking")]
+#[doc(hidden)]
 pub use picking::TerrainPickingPlugin;
 #[cfg(any(feature = "avian", feature = "scatter", feature = "landmass"))]
 pub(crate) use places::Places;
@@ -185,6 +186,7 @@ pub(crate) enum BeforeLoad {
 pub(crate) struct FollowCommits;
 
 /// Transactions, entities and messages; works in `MinimalPlugins`.
+#[doc(hidden)]
 #[derive(Default)]
 pub struct TerrainPlugin;
 

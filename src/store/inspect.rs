@@ -71,6 +71,7 @@ impl Store {
     ///
     /// # Errors
     /// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
+    #[doc(hidden)]
     pub fn check(
         folder: impl AsRef<Path>,
         ground: impl Into<Arc<Ground>>,

@@ -47,15 +47,16 @@ pub use closing::ClosingStore;
 #[cfg(any(test, feature = "tools"))]
 #[doc(hidden)]
 pub use disk::{DiskFault, DiskImage, SimulatedDisk};
-pub use error::{StoreError, StoreWarning, WorldSize};
+#[doc(hidden)]
+pub use error::WorldSize;
+pub use error::{StoreError, StoreWarning};
 #[doc(hidden)]
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
-pub use inspect::{WorldCheck, WorldInfo};
+pub use inspect::WorldInfo;
 #[doc(hidden)]
-pub use inspect::{check_in, inspect_in, read_world, replay};
-pub use levels::RestoreLevelError;
+pub use inspect::{WorldCheck, check_in, inspect_in, read_world, replay};
 #[doc(hidden)]
-pub use levels::read_level_files;
+pub use levels::{RestoreLevelError, read_level_files};
 pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
 pub use portable::WorldFile;

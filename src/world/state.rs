@@ -127,6 +127,7 @@ impl World {
     }
 
     /// The grid of chunks and tiles.
+    #[doc(hidden)]
     pub fn grid(&self) -> ChunkGrid {
         self.grid
     }
