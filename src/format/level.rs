@@ -89,8 +89,8 @@ impl Level {
         write_within(self, &Limits::FORMAT)
     }
 
-    /// Reads the files of a level over its ground, or over another one, which [`ground`](Self::ground) and the hashes of regions
-    /// reveal.
+    /// Reads the files of a level over its ground, or over another one, which [`ground`](Self::ground) and the hashes
+    /// of regions reveal.
     ///
     /// # Errors
     /// When a file is damaged or missing, or does not belong to the level.

@@ -15,7 +15,8 @@ const KEY: &[u8] = b"prefab";
 const LIMIT: usize = 12 * MAX_PREFAB_SAMPLES as usize + 64;
 
 impl Prefab {
-    /// The bytes of the prefab's file: packed, with a checksum and the number of the format. Equal prefabs give equal bytes.
+    /// The bytes of the prefab's file: packed, with a checksum and the number of the format. Equal prefabs give equal
+    /// bytes.
     pub fn to_bytes(&self) -> Vec<u8> {
         packed_prefab(self).to_vec()
     }
@@ -23,8 +24,8 @@ impl Prefab {
     /// Reads what [`to_bytes`](Self::to_bytes) wrote.
     ///
     /// # Errors
-    /// When the bytes are not a prefab, when they were cut off or changed, or when a newer version wrote them. Memory is
-    /// bounded by some 100 MiB, whatever they say.
+    /// When the bytes are not a prefab, when they were cut off or changed, or when a newer version wrote them. Memory
+    /// is bounded by some 100 MiB, whatever they say.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, FormatError> {
         let opened = frame::open(bytes, Kind::Prefab, WorldId::default(), KEY, LIMIT)?;
         plain::from_bytes(&opened.payload, "prefab")

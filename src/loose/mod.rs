@@ -53,9 +53,10 @@ use search::{Budget, Component, Solid};
 ///
 /// A model gets them with [`Terrain::set_loose`](crate::terrain::Terrain::set_loose), and lists the pieces in receipts.
 /// With the feature `plugin` they are also a component: on a terrain's entity they make brushes look for pieces, and a
-/// `LoosePieceFound` message is sent for each. Brushes that a game [applies](crate::terrain::Terrain::apply) itself look
-/// for pieces too, but these are only listed in the receipts: no message is sent, and none falls as debris. A terrain
-/// that is not spawned yet does not have the component: set the same settings on it before you replay a journal.
+/// `LoosePieceFound` message is sent for each. Brushes that a game [applies](crate::terrain::Terrain::apply) itself
+/// look for pieces too, but these are only listed in the receipts: no message is sent, and none falls as debris. A
+/// terrain that is not spawned yet does not have the component: set the same settings on it before you replay a
+/// journal.
 ///
 /// ```
 /// # #[cfg(feature = "plugin")] {

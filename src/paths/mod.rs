@@ -116,10 +116,11 @@ pub struct NavigationSource {
 }
 
 impl WalkSettings {
-    /// Options of an archipelago for agents with these settings, which are in metres, on ground with voxels of this size.
+    /// Options of an archipelago for agents with these settings, which are in metres, on ground with voxels of this
+    /// size.
     ///
-    /// Agents are found on the ground within a step above and below, and within two voxels to its side: they may be pushed
-    /// where the mesh, which keeps whole cells from walls, does not reach.
+    /// Agents are found on the ground within a step above and below, and within two voxels to its side: they may be
+    /// pushed where the mesh, which keeps whole cells from walls, does not reach.
     pub fn archipelago_options(&self, voxel_size: f32) -> ArchipelagoOptions<ThreeD> {
         let vertical = self.step + 2.0 * self.precision + 0.5 * voxel_size;
         ArchipelagoOptions {

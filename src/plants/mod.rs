@@ -176,8 +176,8 @@ pub struct PlantRemoved {
     pub plant: Plant,
     /// Where the plant stood, in world space: its foot, how it is turned, and its size.
     pub transform: Transform,
-    /// Whether a game felled it, as with [`Plant::removal_in_world`]: its ground and the air around it are as they were. `false` if
-    /// they were dug, built over or painted. See [`Scatter::is_felled`].
+    /// Whether a game felled it, as with [`Plant::removal_in_world`]: its ground and the air around it are as they
+    /// were. `false` if they were dug, built over or painted. See [`Scatter::is_felled`].
     pub is_felled: bool,
 }
 

@@ -13,10 +13,12 @@ impl BurrowFigures {
     /// Milliseconds that a transaction took in its task, measured once per commit.
     pub const TRANSACTION: DiagnosticPath = DiagnosticPath::const_new("burrow/transaction");
 
-    /// Milliseconds of a transaction in which the edits were applied and the surfaces extracted, measured once per commit.
+    /// Milliseconds of a transaction in which the edits were applied and the surfaces extracted, measured once per
+    /// commit.
     pub const EDIT: DiagnosticPath = DiagnosticPath::const_new("burrow/edit");
 
-    /// Milliseconds of a transaction in which Bevy meshes were built and surface processors ran, measured once per commit.
+    /// Milliseconds of a transaction in which Bevy meshes were built and surface processors ran, measured once per
+    /// commit.
     pub const MESH: DiagnosticPath = DiagnosticPath::const_new("burrow/mesh");
 
     /// Milliseconds that a commit took on the main thread, measured once per commit.

@@ -7,8 +7,8 @@
 //! everything but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages work by whole strokes, and are answered by [`HistoryMoved`]. On terrains with
-//! [`LooseSettings`](crate::terrain::LooseSettings), a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`]
-//! for each that an undo brings back.
+//! [`LooseSettings`](crate::terrain::LooseSettings), a [`LoosePieceFound`] is sent for each piece that a brush cuts
+//! off, and a [`LoosePieceReturned`] for each that an undo brings back.
 //!
 //! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`],
 //! and, with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is

@@ -8,8 +8,8 @@ use crate::terrain::Terrain;
 
 /// The attributes of vertices in meshes of tiles, chunks and pieces, for materials that read them.
 impl Terrain {
-    /// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have equal ids in
-    /// equal order, so a shader may take those of any corner and blend the weights alone.
+    /// Up to four material ids of a vertex, for materials that look them up. All corners of a triangle have equal ids
+    /// in equal order, so a shader may take those of any corner and blend the weights alone.
     pub const ATTRIBUTE_MATERIAL_IDS: MeshVertexAttribute =
         MeshVertexAttribute::new("Vertex_BurrowMaterialIds", 0x6275_7272_6f77_0001, VertexFormat::Uint8x4);
 
@@ -20,17 +20,17 @@ impl Terrain {
         VertexFormat::Unorm8x4,
     );
 
-    /// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it. Not
-    /// on terrains with [`SlimVertices`](super::SlimVertices).
+    /// How many voxels a vertex lies below the surface that was there before anyone dug; less than 0 above it, 0 on it.
+    /// Not on terrains with [`SlimVertices`](super::SlimVertices).
     pub const ATTRIBUTE_GROUND_DEPTH: MeshVertexAttribute =
         MeshVertexAttribute::new("Vertex_BurrowGroundDepth", 0x6275_7272_6f77_0003, VertexFormat::Float32);
 
     /// The share of the sky that lights a vertex, 0..=1, in x: 1 on a plain, 0 in a cave; see
     /// [`World::sky_light`](crate::terrain::World::sky_light). In y how deep it lies below the surface that was there
-    /// before anyone dug, of which 1 is [`CUT_VOXELS`] or more. In z the share of the sky again or, if it is larger, the
-    /// share of level directions in which a vertex under a roof sees the open within 14 voxels, at most 5/16: what lies
-    /// there is lit, and lights the vertex. w is 0. Materials multiply ambient and indirect light by z, reflections by x,
-    /// and never the light of the sun. Only on terrains with [`SkyLight`](super::SkyLight).
+    /// before anyone dug, of which 1 is [`CUT_VOXELS`] or more. In z the share of the sky again or, if it is larger,
+    /// the share of level directions in which a vertex under a roof sees the open within 14 voxels, at most 5/16: what
+    /// lies there is lit, and lights the vertex. w is 0. Materials multiply ambient and indirect light by z,
+    /// reflections by x, and never the light of the sun. Only on terrains with [`SkyLight`](super::SkyLight).
     pub const ATTRIBUTE_SKY_LIGHT: MeshVertexAttribute =
         MeshVertexAttribute::new("Vertex_BurrowSkyLight", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
 }

@@ -66,8 +66,8 @@ impl Store {
         inspect_in(&Folder::new(folder.as_ref()))
     }
 
-    /// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the
-    /// journal's tail, and, if it is whole, the log from the first commit on.
+    /// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions,
+    /// the journal's tail, and, if it is whole, the log from the first commit on.
     ///
     /// # Errors
     /// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.

@@ -47,11 +47,11 @@ impl Level {
     }
 
     /// Writes the level to a folder, one file for each region, so that version control stores and shows the changes.
-    /// Unchanged files are not written, and files of regions that became empty are removed. Nothing else in the folder is
-    /// touched.
+    /// Unchanged files are not written, and files of regions that became empty are removed. Nothing else in the folder
+    /// is touched.
     ///
-    /// After a crash the folder holds the old level or the new one: new files are complete before the first of the old ones
-    /// is touched, and [`load`](Self::load) reads new files that have not replaced the old ones yet.
+    /// After a crash the folder holds the old level or the new one: new files are complete before the first of the old
+    /// ones is touched, and [`load`](Self::load) reads new files that have not replaced the old ones yet.
     ///
     /// # Errors
     /// When a file can't be written, or the folder has no name.

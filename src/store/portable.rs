@@ -28,8 +28,8 @@ impl WorldFile {
     /// Neither the ground nor history are part of it.
     ///
     /// # Errors
-    /// [`StoreError::TooLarge`] when it could not be read again: data of the game's and 13 bytes for each region may take
-    /// 256 MiB.
+    /// [`StoreError::TooLarge`] when it could not be read again: data of the game's and 13 bytes for each region may
+    /// take 256 MiB.
     pub fn to_bytes(
         terrain: &Terrain,
         world: WorldId,
