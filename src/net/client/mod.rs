@@ -35,7 +35,7 @@ use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{Order, Patch, Receipt, Rejection, TerrainError, TerrainSettings, World};
+use crate::terrain::{Order, Patch, Receipt, Rejection, Terrain, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
