@@ -166,8 +166,8 @@ impl Client {
     }
 
     /// Starts with a world that the game already has, such as a level that it ships, instead of the pristine one: its
-    /// [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent.
-    /// Call it before the first [`connect`](Self::connect).
+    /// parts. Once it joins, only regions that differ from the server's are sent. Call it before the first
+    /// [`connect`](Self::connect).
     ///
     /// # Errors
     /// When the parts do not fit the ground or the chunk size.
