@@ -19,7 +19,6 @@ use bevy_burrow::paths::bevy_landmass::prelude::*;
 use bevy_burrow::paths::bevy_landmass::{Agent3d, PauseAgent};
 use bevy_burrow::paths::{
     Navigation, NavigationArea, NavigationPlugin, NavigationSource, NavigationSystems, NavigationTiles,
-    archipelago_options,
 };
 use bevy_burrow::prelude::*;
 use clap::Parser;
@@ -235,7 +234,7 @@ fn app(options: &Options, agents: usize) -> App {
     let world = app.world_mut();
     let terrain = world.spawn(terrain).id();
     let agent = options.agent();
-    let mut landmass = archipelago_options(&agent, 1.0);
+    let mut landmass = agent.archipelago_options(1.0);
     landmass.neighbourhood = options.neighbourhood.unwrap_or(landmass.neighbourhood);
     let archipelago = world.spawn(Archipelago3d::new(landmass)).id();
     let area = NavigationArea::NearSources;

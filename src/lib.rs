@@ -88,7 +88,7 @@
 //! | ground that resists | [`Terrain::set_rules`](terrain::Terrain::set_rules) with [`DiggingRules`](volume::DiggingRules) |
 //! | to learn the result | `BrushApplied` messages with a [`Receipt`](terrain::Receipt); entity events of chunks and fields |
 //! | to undo it | `Undo` and `Redo` messages, `HistoryMoved`; [`Terrain::history`](terrain::Terrain::history) |
-//! | ground that falls when it is cut off | the `LooseGround` component, `LoosePieceFound` messages, `physics::DebrisPlugin` (feature `avian`); [`LooseSettings`](terrain::LooseSettings) |
+//! | ground that falls when it is cut off | the component [`LooseSettings`](terrain::LooseSettings), `LoosePieceFound` messages, `physics::DebrisPlugin` (feature `avian`) |
 //! | to query the ground | the `Terrains` system parameter: ray cast, height, spans, `is_ready` |
 //! | ground that looks real | `GroundLook` on the terrain; `GroundTextures` for the game's own textures |
 //! | bodies on the ground, a body that walks | `physics` (feature `avian`): `TerrainPhysicsPlugin`, `ColliderSource`, `Character` |
@@ -178,7 +178,7 @@
 //! # use bevy_burrow::prelude::*;
 //! fn loosen(app: &mut App, terrain: Terrain) {
 //!     app.add_plugins(DebrisPlugin);
-//!     app.world_mut().spawn((terrain, LooseGround { crumbs: 8, debris: 4096, ..default() }));
+//!     app.world_mut().spawn((terrain, LooseSettings { crumbs: 8, debris: 4096, ..default() }));
 //! }
 //! # }
 //! ```
@@ -246,7 +246,7 @@
 //! | `threads` | thread pools of the plugin |
 //! | [`lattice`], [`lod`], [`ground`] | coordinates, levels of detail, the pristine world |
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
-//! | [`surface`], [`dense`] | marching cubes, heightmap and their seam; a mesher of plain arrays |
+//! | [`surface`], `dense` | marching cubes, heightmap and their seam; a mesher of plain arrays |
 //! | [`backend`] | engines on CPU and GPU |
 //! | `world`, `loose`, `redraw` | the world at one revision and queries; loose pieces; which meshes change |
 //! | [`terrain`] | orders, transactions, history, the commit log; exports what the three above have for games |
@@ -355,6 +355,7 @@ pub mod backend;
 pub mod brush;
 #[cfg(feature = "debug")]
 pub mod debug;
+#[doc(hidden)]
 pub mod dense;
 mod edits;
 #[cfg(feature = "format")]
@@ -419,9 +420,9 @@ pub mod prelude {
     #[cfg(feature = "plugin")]
     pub use crate::plugin::{
         BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, BurrowSystems, Chunk, DetailSource, Field,
-        GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LooseGround, LoosePieceFound,
-        LoosePieceReturned, MaterialColors, Redo, Redraw, ShownLevels, SkyLight, SlimVertices, TargetedBrush,
-        TerrainHit, TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
+        GroundPiece, HeightmapImage, HistoryMoved, LevelsOfDetail, LoosePieceFound, LoosePieceReturned,
+        MaterialColors, Redo, Redraw, ShownLevels, SkyLight, SlimVertices, TargetedBrush, TerrainHit,
+        TerrainPropagatePlugin, TerrainReady, Terrains, Tile, Undo,
     };
     #[cfg(all(feature = "plugin", feature = "store"))]
     pub use crate::saves::{

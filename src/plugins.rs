@@ -12,8 +12,8 @@ use crate::plugin::{HeightmapPlugin, TerrainPlugin};
 ///
 /// | plugin | what it does |
 /// | --- | --- |
-/// | [`TerrainPlugin`] | transactions, entities, messages |
-/// | [`HeightmapPlugin`] | asset loader for heightmap images, where there is an `AssetPlugin` |
+/// | `TerrainPlugin` | transactions, entities, messages |
+/// | `HeightmapPlugin` | asset loader for heightmap images, where there is an `AssetPlugin` |
 /// | `GroundFilePlugin` | grounds of files, where there is an `AssetPlugin` (feature `format`) |
 /// | `TerrainPickingPlugin` | hits of pointers on the ground, for `bevy_picking` (feature `picking`) |
 /// | `SavePlugin` | saves worlds of terrains with a `SavedWorld` (feature `store`) |

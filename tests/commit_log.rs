@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{
-    CommitRecord, LogEntry, MeshKey, Meshing, PartsError, Patch, ReplayError, RestoreError, SIMULATION, World,
+    CommitRecord, LogEntry, MeshKey, Meshing, PartsError, Patch, ReplayError, RestoreError, World,
 };
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
@@ -341,7 +341,7 @@ fn a_piece_that_broke_off_comes_back_from_a_save() {
     assert!(serde_json::from_str::<LoosePiece>(&broken).is_err());
 }
 
-/// If this fails, the same edits no longer give the same world: raise [`SIMULATION`] and enter the new hash.
+/// If this fails, the same edits no longer give the same world: raise [`Terrain::SIMULATION`] and enter the new hash.
 #[test]
 fn the_simulation_has_its_number() {
     let mut rng = Rng::with_seed(1);
@@ -351,5 +351,5 @@ fn the_simulation_has_its_number() {
     for _ in 0..40 {
         terrain.apply([any_random_brush(&mut rng, terrain.world().ground())]);
     }
-    assert_eq!((SIMULATION, terrain.world().hash()), (2, 0x66078FB9F192FA79));
+    assert_eq!((Terrain::SIMULATION, terrain.world().hash()), (2, 0x66078FB9F192FA79));
 }

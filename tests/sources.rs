@@ -2,7 +2,7 @@
 
 mod worlds;
 
-use bevy_burrow::ground::{ColumnGrid, FunctionSource, Ground, HeightSource, MAX_SOURCE_SIZE};
+use bevy_burrow::ground::{ColumnGrid, FunctionSource, Ground, HeightSource};
 use bevy_burrow::lattice::{ChunkPos, Column, TilePos};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::Applied;
@@ -99,7 +99,7 @@ fn moved(applied: &Applied, by: i32) -> Applied {
 
 #[test]
 fn digging_at_the_far_corner_is_digging_at_the_origin() {
-    let away = MAX_SOURCE_SIZE as i32 - BLOCK;
+    let away = Ground::MAX_SOURCE_SIZE as i32 - BLOCK;
     let rng = &mut Rng::with_seed(8);
     let [mut near, mut far] = [0, away].map(world_with_block);
     for step in 0..60 {

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use bevy_burrow::format::WorldId;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{from_bytes, to_bytes};
+use bevy_burrow::store::WorldFile;
 use bevy_burrow::terrain::Meshing;
 use fastrand::Rng;
 use glam::Vec3;
@@ -40,10 +40,10 @@ fn print_world(name: &str, ground: &Arc<Ground>, digs: Vec<(Vec3, f32)>) {
     let samples: u64 =
         terrain.world().bricks().map(|(pos, brick)| brick.edited_samples(pos).count() as u64).sum();
     let start = Instant::now();
-    let bytes = to_bytes(&terrain, WorldId(1), &BTreeMap::new()).expect("a small world");
+    let bytes = WorldFile::to_bytes(&terrain, WorldId(1), &BTreeMap::new()).expect("a small world");
     let encoded = start.elapsed().as_secs_f64();
     let start = Instant::now();
-    let imported = from_bytes(&bytes, Arc::clone(ground)).expect("the bytes of a world");
+    let imported = WorldFile::from_bytes(&bytes, Arc::clone(ground)).expect("the bytes of a world");
     let decoded = start.elapsed().as_secs_f64();
     assert_eq!(imported.terrain.world().hash(), terrain.world().hash());
     let million = samples as f64 / 1e6;

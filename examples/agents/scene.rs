@@ -8,7 +8,7 @@ use bevy_burrow::debug::BurrowDebug;
 use bevy_burrow::navigation::WalkSettings;
 use bevy_burrow::paths::bevy_landmass::debug::EnableLandmassDebug;
 use bevy_burrow::paths::bevy_landmass::prelude::*;
-use bevy_burrow::paths::{Navigation, NavigationArea, archipelago_options};
+use bevy_burrow::paths::{Navigation, NavigationArea};
 use bevy_burrow::prelude::*;
 
 use crate::figures::Figure;
@@ -55,7 +55,7 @@ pub fn set_up(mut commands: Commands, mut materials: ResMut<Assets<StandardMater
     let material = materials.add(StandardMaterial { perceptual_roughness: 1.0, ..default() });
     let terrain = Terrain::new(ground, &TerrainSettings { chunk_size: 16, ..default() })?;
     let terrain = commands.spawn((terrain, MeshMaterial3d(material))).id();
-    let archipelago = commands.spawn(Archipelago3d::new(archipelago_options(&AGENT, 1.0))).id();
+    let archipelago = commands.spawn(Archipelago3d::new(AGENT.archipelago_options(1.0))).id();
     commands.spawn(Navigation { terrain, archipelago, agent: AGENT, area: NavigationArea::Everywhere });
     commands.insert_resource(Paths(archipelago));
     commands.spawn((

@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::PathBuf;
 
+use bevy_burrow::format::Level;
 use bevy_burrow::ground::{GreyImage, Ground, GroundError, ImageLimits, ImageScale, Strata};
-use bevy_burrow::store::{BaseChanged, BaseLevel, load_level};
+use bevy_burrow::store::{BaseChanged, BaseLevel};
 use clap::{Args, ValueEnum};
 
 use crate::json;
@@ -101,7 +102,7 @@ impl GroundArgs {
     pub fn level(&self, ground: &Ground) -> Result<Option<BaseLevel>, String> {
         let Some(path) = &self.level else { return Ok(None) };
         let at = |error: &dyn std::fmt::Display| format!("{}: {error}", path.display());
-        let level = load_level(path, ground).map_err(|error| at(&error))?;
+        let level = Level::load(path, ground).map_err(|error| at(&error))?;
         Ok(Some(BaseLevel::new(level, path.display().to_string())))
     }
 }

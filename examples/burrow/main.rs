@@ -45,7 +45,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 
-use bevy_burrow::store::{self, BaseChanged, Folder, Store, StoreError, StoreOptions};
+use bevy_burrow::store::{self, BaseChanged, Folder, Store, StoreError, StoreOptions, WorldFile};
 use bevy_burrow::terrain::World;
 use clap::{Parser, Subcommand};
 use serde_json::{Map, Value, json};
@@ -173,7 +173,7 @@ fn state(world: &World) -> Map<String, Value> {
 }
 
 fn info(world: &Path) -> Result<(Value, bool), String> {
-    let info = store::inspect(world).map_err(|why| why.to_string())?;
+    let info = Store::inspect(world).map_err(|why| why.to_string())?;
     let game: Map<String, Value> =
         info.game.iter().map(|(key, bytes)| (key.clone(), (*bytes).into())).collect();
     let answer = json!({
@@ -201,7 +201,7 @@ fn info(world: &Path) -> Result<(Value, bool), String> {
 fn check(world: &Path, args: &GroundArgs) -> Result<(Value, bool), String> {
     let Some(ground) = args.build()? else { return info(world) };
     let level = args.level(&ground)?;
-    let check = store::check(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
+    let check = Store::check(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
     let is_sound = check.warnings.is_empty() && check.replays != Some(false);
     let mut answer = state(check.terrain.world());
     answer.insert("warnings".into(), check.warnings.into());
@@ -239,7 +239,7 @@ fn export(world: &Path, file: &Path, args: &GroundArgs) -> Result<(Value, bool),
     let ground = args.required()?;
     let level = args.level(&ground)?;
     let read = store::read_world(world, ground, level.as_ref()).map_err(|why| why.to_string())?;
-    let bytes = store::to_bytes(&read.terrain, read.world, &read.game).map_err(|why| why.to_string())?;
+    let bytes = WorldFile::to_bytes(&read.terrain, read.world, &read.game).map_err(|why| why.to_string())?;
     write_new(file, &bytes).map_err(|error| match error.kind() {
         io::ErrorKind::AlreadyExists => format!("{} is there already: give another name", file.display()),
         _ => format!("{}: {error}", file.display()),
@@ -272,7 +272,7 @@ fn import(file: &Path, world: &Path, args: &GroundArgs) -> Result<(Value, bool),
     let bytes = fs::read(file).map_err(|error| at(&error))?;
     let ground = args.required()?;
     let level = args.level(&ground)?;
-    let imported = store::from_bytes(&bytes, ground).map_err(|error| match error {
+    let imported = WorldFile::from_bytes(&bytes, ground).map_err(|error| match error {
         StoreError::Restore(_) => format!("{}: is it the ground that the world was saved with?", at(&error)),
         error => at(&error),
     })?;

@@ -9,7 +9,6 @@ use bevy::render::render_resource::{
     AsBindGroup, Face, RenderPipelineDescriptor, SpecializedMeshPipelineError,
 };
 use bevy::shader::{ShaderDefVal, ShaderRef};
-use bevy_burrow::plugin::ATTRIBUTE_GROUND_DEPTH;
 use bevy_burrow::prelude::*;
 use bevy_burrow::view::prepass_vertex_shader;
 
@@ -83,7 +82,7 @@ impl Material for MapMaterial {
             Mesh::ATTRIBUTE_POSITION.at_shader_location(0),
             Mesh::ATTRIBUTE_NORMAL.at_shader_location(1),
             Mesh::ATTRIBUTE_COLOR.at_shader_location(2),
-            ATTRIBUTE_GROUND_DEPTH.at_shader_location(3),
+            Terrain::ATTRIBUTE_GROUND_DEPTH.at_shader_location(3),
         ];
         descriptor.vertex.buffers = vec![layout.0.get_layout(&attributes)?];
         Ok(())

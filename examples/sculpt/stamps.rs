@@ -7,7 +7,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use bevy::prelude::*;
-use bevy_burrow::format::{read_prefab, write_prefab};
 use bevy_burrow::ground::ImageError;
 use bevy_burrow::panel::{BrushTool, BurrowPanel, StampImage, ToolOperation, ToolPrefab};
 use bevy_burrow::prelude::*;
@@ -98,7 +97,7 @@ fn take_prefab(file: &Path, tool: &mut BrushTool) -> Result<String, String> {
     let mut bytes = Vec::new();
     let opened = File::open(file).map_err(|why| failed(why.to_string()))?;
     opened.take(MOST_PREFAB).read_to_end(&mut bytes).map_err(|why| failed(why.to_string()))?;
-    let prefab = read_prefab(&bytes).map_err(|why| failed(why.to_string()))?;
+    let prefab = Prefab::from_bytes(&bytes).map_err(|why| failed(why.to_string()))?;
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     tool.prefab = ToolPrefab { name: Some(name.into()), ..ToolPrefab::new(prefab, 1.0) };
     tool.operation = ToolOperation::Paste;
@@ -111,7 +110,7 @@ pub fn keep(copy: &ToolPrefab, folder: &Path) -> Result<String, String> {
     let file = |number: u32| folder.join(format!("copy_{number}.{PREFAB}"));
     let file = file((1..10_000).find(|number| !file(*number).exists()).unwrap_or_default());
     std::fs::create_dir_all(folder)
-        .and_then(|()| std::fs::write(&file, write_prefab(prefab)))
+        .and_then(|()| std::fs::write(&file, prefab.to_bytes()))
         .map_err(|why| format!("The copy could not be saved in {}: {why}", file.display()))?;
     Ok(format!("Copied, and saved to {}", file.display()))
 }

@@ -8,7 +8,6 @@ use std::time::Duration;
 use bevy::prelude::*;
 use bevy::window::PrimaryWindow;
 use bevy_burrow::brush::Blend;
-use bevy_burrow::debug::draw_shape;
 use bevy_burrow::panel::{
     BrushTool, BurrowPanel, PanelAction, PanelInput, ToolOperation, ToolShape, pointer_is_free,
 };
@@ -232,12 +231,12 @@ fn preview(
         _ => Color::srgb(1.0, 0.80, 0.30),
     };
     if tool.placed.is_none() {
-        draw_shape(&mut gizmos, &tool.shape_at(hit), color.with_alpha(0.5));
+        tool.shape_at(hit).draw(&mut gizmos, color.with_alpha(0.5));
     }
     if tool.fitting_shape() == ToolShape::Path {
         let ends = tool.points.iter().chain([&hit.position]).map(|&point| (point, tool.radius));
         let points: Vec<(Vec3, f32)> = ends.collect();
-        let draw = |tube: Shape| draw_shape(&mut gizmos, &tube, color.with_alpha(0.5));
+        let draw = |tube: Shape| tube.draw(&mut gizmos, color.with_alpha(0.5));
         if tool.is_smooth {
             Shape::along_spline(&points).for_each(draw);
         } else {

@@ -146,8 +146,8 @@ pub(crate) use sculpt_kernel::SculptKernel;
 #[cfg(feature = "cuda")]
 pub(crate) use sculpt_kernel::SculptOp;
 #[doc(hidden)]
-pub use shapes::AnyShape;
-pub use shapes::{BrushPath, Corridor, CustomShape, GridShape, MeshGrid, Shape, ShapeGrid};
+pub use shapes::{AnyShape, CustomShape};
+pub use shapes::{BrushPath, Corridor, GridShape, MeshGrid, Shape, ShapeGrid};
 pub use stamp::Stamp;
 pub(crate) use stencil::{FARTHEST, Stencil, is_moved};
 

@@ -104,7 +104,8 @@ impl PrefabSample {
 /// A box of a world: the density and the material of each of its samples, and which of them were edited.
 ///
 /// [`World::copy`](crate::terrain::World::copy) makes one, and a brush pastes it: see [`Paste`](super::Paste). It is
-/// kept in a file by `format::write_prefab`, and named by its [hash](Self::hash) in what is sent to clients.
+/// kept in a file by `Prefab::to_bytes` (feature `format`), and named by its [hash](Self::hash) in what is sent to
+/// clients.
 #[derive(Clone)]
 pub struct Prefab {
     size: IVec3,

@@ -23,7 +23,8 @@
 //!
 //! Views are lines on children of the terrain's entity, on its `RenderLayers`. They cover the surroundings of a place,
 //! up to a limit of lines, and are drawn again when the world or the place changes. Their cost depends on the radius
-//! and not on the size of the world. [`SeamWires`] and [`draw_shape`] can be used by themselves.
+//! and not on the size of the world. [`SeamWires`] and [`Shape::draw`](crate::brush::Shape::draw) can be used by
+//! themselves.
 
 mod lines;
 mod place;
@@ -35,7 +36,8 @@ mod views;
 mod walkable;
 mod wires;
 
-pub use plugin::{BurrowDebugPlugin, DebugLines};
+pub use plugin::BurrowDebugPlugin;
+#[doc(hidden)]
+pub use plugin::DebugLines;
 pub use settings::{BurrowDebug, DebugView};
-pub use shape::draw_shape;
 pub use wires::SeamWires;

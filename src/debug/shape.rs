@@ -5,12 +5,14 @@ use bevy::prelude::*;
 
 use crate::brush::Shape;
 
-/// Draws the outline of a brush's shape.
-pub fn draw_shape<Config: GizmoConfigGroup, Clear: 'static + Send + Sync>(
-    gizmos: &mut GizmoBuffer<Config, Clear>,
-    shape: &Shape,
-    color: impl Into<Color>,
-) {
-    let color = color.into();
-    shape.outline(|from, to| gizmos.line(from, to, color));
+impl Shape {
+    /// Draws the shape's outline.
+    pub fn draw<Config: GizmoConfigGroup, Clear: 'static + Send + Sync>(
+        &self,
+        gizmos: &mut GizmoBuffer<Config, Clear>,
+        color: impl Into<Color>,
+    ) {
+        let color = color.into();
+        self.outline(|from, to| gizmos.line(from, to, color));
+    }
 }

@@ -6,7 +6,7 @@ use super::lines::LineBuffer;
 use super::place::Place;
 use super::wires::{around, voxels};
 use crate::lattice::{Column, ONE};
-use crate::navigation::{NAV_TILE, NavTilePos, WalkableTile, Walker};
+use crate::navigation::{NavTilePos, WalkableTile, Walker};
 use crate::terrain::World;
 
 const GROUND: LinearRgba = LinearRgba::rgb(0.10, 0.80, 0.25);
@@ -30,7 +30,7 @@ pub fn draw(world: &World, place: Place, out: &mut LineBuffer) {
     // The nearest first, should there not be room for all.
     let mut tiles: Vec<NavTilePos> = NavTilePos::covering(world, low, high).collect();
     tiles.sort_by_cached_key(|tile| {
-        let middle = tile.origin().at(0) + NAV_TILE / 2;
+        let middle = tile.origin().at(0) + NavTilePos::SIZE / 2;
         (middle - place.focus.as_ivec3()).with_y(0).length_squared()
     });
     for pos in tiles {

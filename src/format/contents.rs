@@ -14,7 +14,7 @@ use super::ids::ContentId;
 use super::ids::{Kind, WorldId};
 use super::prefab::packed_prefab;
 #[cfg(feature = "store")]
-use super::{bytes::put_bytes, frame, prefab::read_prefab};
+use super::{bytes::put_bytes, frame};
 use crate::brush::{BrushError, Content, ContentMut, Edit, Prefab, ShapeGrid};
 use crate::ground::GreyImage;
 
@@ -104,7 +104,7 @@ impl ContentTable {
         id
     }
 
-    /// Adds a prefab; `None` for one that is too large to be sent: its [file](super::write_prefab) takes more than
+    /// Adds a prefab; `None` for one that is too large to be sent: its [file](Prefab::to_bytes) takes more than
     /// 4 MiB.
     pub fn add_prefab(&mut self, prefab: impl Into<Arc<Prefab>>) -> Option<ContentId> {
         let prefab = prefab.into();
@@ -186,7 +186,7 @@ impl ContentTable {
                         .into_iter()
                         .for_each(|image| drop(found.images.insert(ContentId::of(&image), image)));
                 }
-                Err(_) => read_prefab(part).into_iter().for_each(|prefab| {
+                Err(_) => Prefab::from_bytes(part).into_iter().for_each(|prefab| {
                     found.insert_prefab(Arc::new(prefab));
                 }),
             }

@@ -17,7 +17,7 @@ use super::portable::{SavedRegion, by_region, of_regions};
 use super::region::region_key;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{EditSettings, LooseSettings, SIMULATION, TerrainSettings, WorldParts};
+use crate::terrain::{EditSettings, LooseSettings, Terrain, TerrainSettings, WorldParts};
 use crate::volume::DiggingRules;
 
 /// The file that describes a level.
@@ -34,12 +34,15 @@ pub struct Level {
     /// The [hash](Ground::hash) of the ground that it was made on.
     pub ground: u64,
     /// The greatest name that a field has had.
+    #[doc(hidden)]
     pub next_field: u64,
     /// The rules and the search for loose pieces that edits obey.
+    #[doc(hidden)]
     pub edit_settings: EditSettings,
     /// The game's data, by key.
     pub game: BTreeMap<String, Vec<u8>>,
     /// Regions that hold anything; their revisions are 0.
+    #[doc(hidden)]
     pub regions: BTreeMap<RegionPos, SavedRegion>,
 }
 
@@ -61,6 +64,7 @@ struct Description {
 
 impl Level {
     /// A level of the parts of a world over this ground.
+    #[doc(hidden)]
     pub fn new(parts: WorldParts, voxel_size: f32, game: BTreeMap<String, Vec<u8>>, ground: &Ground) -> Self {
         let WorldParts { change, chunk_size, edit_settings, .. } = parts;
         let (settings, next_field) = (TerrainSettings { chunk_size, voxel_size }, change.next_field);
@@ -69,10 +73,45 @@ impl Level {
     }
 
     /// The level's parts, from which [`Terrain::restore`](crate::terrain::Terrain::restore) makes a terrain.
+    #[doc(hidden)]
     pub fn parts(&self) -> WorldParts {
         let change = of_regions(&self.regions, self.next_field);
         let (chunk_size, edit_settings) = (self.settings.chunk_size, self.edit_settings.clone());
         WorldParts { change, chunk_size, revision: 0, edit_settings }
+    }
+
+    /// The files of the level, by name. Equal content gives equal bytes, file by file.
+    ///
+    /// # Errors
+    /// When settings hold numbers that JSON can't, and [`FormatError::TooLarge`] when `level.json` with the game's data
+    /// takes more than 64 MiB or a region more than 8 MiB, which bricks and fields of a terrain never do.
+    pub fn to_files(&self) -> Result<LevelFiles, FormatError> {
+        write_within(self, &Limits::FORMAT)
+    }
+
+    /// Reads the files of a level over its ground, or over another one, which [`ground`](Self::ground) and the hashes
+    /// of regions reveal.
+    ///
+    /// # Errors
+    /// When a file is damaged or missing, or does not belong to the level.
+    pub fn from_files(files: &LevelFiles, ground: &Ground) -> Result<Self, FormatError> {
+        read_within(files, ground, &Limits::FORMAT)
+    }
+
+    /// A level's files in one, to ship.
+    ///
+    /// # Errors
+    /// [`FormatError::TooLarge`] when a file takes more than 64 MiB, or all together more than a GiB once packed.
+    pub fn pack_files(files: &LevelFiles) -> Result<Vec<u8>, FormatError> {
+        pack_within(files, &Limits::FORMAT)
+    }
+
+    /// Reads what [`pack_files`](Self::pack_files) wrote; no ground is needed.
+    ///
+    /// # Errors
+    /// When it is damaged, or holds a file with a name that is not used in levels.
+    pub fn unpack_files(packed: &[u8]) -> Result<LevelFiles, FormatError> {
+        unpack_within(packed, &Limits::FORMAT)
     }
 }
 
@@ -94,19 +133,10 @@ fn file_error(name: &str, why: impl ToString) -> FormatError {
     FormatError::File { name: name.into(), why: why.to_string() }
 }
 
-/// The files of a level. Equal content gives equal bytes, file by file.
-///
-/// # Errors
-/// When settings hold numbers that JSON can't, and [`FormatError::TooLarge`] when `level.json` with the game's data
-/// takes more than 64 MiB or a region more than 8 MiB, which bricks and fields of a terrain never do.
-pub fn write_level(level: &Level) -> Result<LevelFiles, FormatError> {
-    write_within(level, &Limits::FORMAT)
-}
-
 pub(super) fn write_within(level: &Level, limits: &Limits) -> Result<LevelFiles, FormatError> {
     let description = Description {
         burrow_level: frame::PLAIN,
-        simulation: SIMULATION,
+        simulation: Terrain::SIMULATION,
         settings: level.settings,
         ground: format!("{:016x}", level.ground),
         next_field: level.next_field,
@@ -125,15 +155,6 @@ pub(super) fn write_within(level: &Level, limits: &Limits) -> Result<LevelFiles,
         files.insert(region_name(*at), sealed);
     }
     Ok(files)
-}
-
-/// Reads the files of a level over its ground, or over another one, which [`Level::ground`] and the hashes of regions
-/// reveal.
-///
-/// # Errors
-/// When a file is damaged or missing, or does not belong to the level.
-pub fn read_level(files: &LevelFiles, ground: &Ground) -> Result<Level, FormatError> {
-    read_within(files, ground, &Limits::FORMAT)
 }
 
 pub(super) fn read_within(
@@ -189,14 +210,6 @@ fn read_description(json: &[u8]) -> Result<Description, FormatError> {
     serde_json::from_slice(json).map_err(invalid)
 }
 
-/// A level's files in one, to ship.
-///
-/// # Errors
-/// [`FormatError::TooLarge`] when a file takes more than 64 MiB, or all together more than a GiB once packed.
-pub fn pack_level(files: &LevelFiles) -> Result<Vec<u8>, FormatError> {
-    pack_within(files, &Limits::FORMAT)
-}
-
 pub(super) fn pack_within(files: &LevelFiles, limits: &Limits) -> Result<Vec<u8>, FormatError> {
     let file = |(name, bytes): (&String, &Vec<u8>)| {
         check(bytes, limits.level_file)?;
@@ -205,14 +218,6 @@ pub(super) fn pack_within(files: &LevelFiles, limits: &Limits) -> Result<Vec<u8>
     let frames = files.iter().map(file).collect::<Result<Vec<Vec<u8>>, FormatError>>()?;
     let packed = container::write(Kind::Level, WorldId::default(), &[], &frames, limits.head)?;
     within(packed, limits.packed_level)
-}
-
-/// Reads what [`pack_level`] wrote; no ground is needed.
-///
-/// # Errors
-/// When it is damaged, or holds a file with a name that is not used in levels.
-pub fn unpack_level(packed: &[u8]) -> Result<LevelFiles, FormatError> {
-    unpack_within(packed, &Limits::FORMAT)
 }
 
 pub(super) fn unpack_within(packed: &[u8], limits: &Limits) -> Result<LevelFiles, FormatError> {

@@ -19,7 +19,7 @@ pub struct Metadata {
     pub next_field: u64,
     /// The rules and the search for loose pieces that edits obey.
     pub edit_settings: EditSettings,
-    /// The [`SIMULATION`](crate::terrain::SIMULATION) that made it.
+    /// The [`Terrain::SIMULATION`](crate::terrain::Terrain::SIMULATION) that made it.
     pub simulation: u32,
     /// The hash of the whole ground, as [`Ground::hash`](crate::ground::Ground::hash) gives it.
     pub ground: u64,

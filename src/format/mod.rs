@@ -46,15 +46,15 @@ pub(crate) mod residuals;
 pub use batch::Batch;
 pub use error::FormatError;
 pub use ids::WorldId;
+pub use level::Level;
 #[doc(hidden)]
 pub use level::LevelFiles;
-pub use level::{Level, pack_level, read_level, unpack_level, write_level};
+#[doc(hidden)]
 pub use metadata::Metadata;
 #[doc(hidden)]
 pub use portable::{PortableHead, SavedRegion, read_portable_head};
 #[doc(hidden)]
 pub use portable::{PortableWorld, read_portable, write_portable};
-pub use prefab::{read_prefab, write_prefab};
 #[cfg(any(feature = "net", feature = "store", test))]
 pub(crate) use region::{decode_region, encode_region};
 

@@ -74,7 +74,7 @@ impl Ground {
     /// # Errors
     /// - [`GroundError::ImageTooSmall`] for an image of less than 2 x 2 samples.
     /// - [`GroundError::Parameter`] for a parameter out of its range.
-    /// - [`GroundError::Size`] if the world would be larger than [`MAX_SIZE`](super::MAX_SIZE).
+    /// - [`GroundError::Size`] if the world would be larger than [`Ground::MAX_SIZE`].
     /// - [`GroundError::Height`] where a spline or the detail leaves the lattice's limit.
     /// - [`GroundError::Memory`] if the machine has too little.
     pub fn from_image(image: &GreyImage, scale: &ImageScale) -> Result<Self, GroundError> {

@@ -57,7 +57,7 @@ pub use image_heights::{Detail, ImageScale};
 pub use import::{
     ElevationGrid, ElevationScale, ElevationTile, HeightFormat, HeightScale, IdOptions, ImportError,
     ImportNote, ImportOptions, ImportReport, MAX_LAYERS, MaterialNote, MaterialReport, RawLayout, Repair,
-    SampleKind, SplatOptions, TileEdges, tile_place,
+    SampleKind, SplatOptions, TileEdges,
 };
 #[doc(hidden)]
 pub use material::OVERLAY_DEPTH;
@@ -84,15 +84,8 @@ pub use strata::{MAX_COLUMN_CONDITIONS, MAX_STRATA};
 pub use world::Ground;
 pub(crate) use world::RowBuffer;
 
-/// The maximum number of cells along one side of a world whose heights are kept in memory.
-pub const MAX_SIZE: u32 = 16_384;
+/// See [`Ground::MAX_SIZE`].
+pub(crate) const MAX_SIZE: u32 = 16_384;
 
-/// The maximum number of cells along one side of a world with a [`HeightSource`]: the same as brushes
-/// [reach](crate::lattice::REACH).
-///
-/// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
-/// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536
-/// voxels from the origin, and to 1/64 voxel at the far end of such a world. Meshes are stored relative to
-/// their own origins and lose nothing; a camera that goes that far needs an origin that follows it, as in any
-/// game with `f32` transforms.
-pub const MAX_SOURCE_SIZE: u32 = crate::lattice::REACH.cast_unsigned();
+/// See [`Ground::MAX_SOURCE_SIZE`].
+pub(crate) const MAX_SOURCE_SIZE: u32 = crate::lattice::REACH.cast_unsigned();

@@ -54,7 +54,7 @@ impl Ground {
     /// Ground of `width` x `depth` cells from noise. Rows are evaluated in parallel.
     ///
     /// # Errors
-    /// - [`GroundError::Size`] unless width and depth are 1 to [`MAX_SIZE`](super::MAX_SIZE).
+    /// - [`GroundError::Size`] unless width and depth are 1 to [`Ground::MAX_SIZE`].
     /// - [`GroundError::Parameter`] for a parameter out of its range.
     /// - [`GroundError::Height`] if base and amplitude together leave the lattice's limit.
     /// - [`GroundError::Memory`] if the machine has too little.

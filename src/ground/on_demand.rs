@@ -24,7 +24,7 @@ impl Ground {
     /// [`Self::hash`] and [`Self::height_range`], which depend on the source's promises.
     ///
     /// # Errors
-    /// [`GroundError::SourceSize`] unless width and depth are 1 to [`MAX_SOURCE_SIZE`](super::MAX_SOURCE_SIZE).
+    /// [`GroundError::SourceSize`] unless width and depth are 1 to [`Ground::MAX_SOURCE_SIZE`].
     pub fn from_source(width: u32, depth: u32, source: impl HeightSource) -> Result<Self, GroundError> {
         let extent = Extent::of_source(width, depth)?;
         Ok(Self::of_pages(extent, Pages::new(Box::new(source), extent)))

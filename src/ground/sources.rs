@@ -19,7 +19,7 @@ impl Ground {
     /// bits on all of them.
     ///
     /// # Errors
-    /// - [`GroundError::Size`] unless width and depth are 1 to [`MAX_SIZE`](super::MAX_SIZE).
+    /// - [`GroundError::Size`] unless width and depth are 1 to [`Ground::MAX_SIZE`].
     /// - [`GroundError::Height`] for the first column whose height is not finite or farther than
     ///   [`LIMIT`] voxels from zero.
     /// - [`GroundError::Memory`] if the machine has too little.
@@ -37,7 +37,7 @@ impl Ground {
     /// `(width + 1) * (depth + 1)` of them.
     ///
     /// # Errors
-    /// - [`GroundError::Size`] unless width and depth are 1 to [`MAX_SIZE`](super::MAX_SIZE).
+    /// - [`GroundError::Size`] unless width and depth are 1 to [`Ground::MAX_SIZE`].
     /// - [`GroundError::Count`] if the list has another length.
     /// - [`GroundError::Height`] for the first height farther than [`LIMIT`] voxels from zero.
     pub fn from_heights(width: u32, depth: u32, heights: Vec<i32>) -> Result<Self, GroundError> {

@@ -54,6 +54,19 @@ pub(crate) struct RowBuffer {
 }
 
 impl Ground {
+    /// The maximum number of cells along one side of a world whose heights are kept in memory.
+    pub const MAX_SIZE: u32 = super::MAX_SIZE;
+
+    /// The maximum number of cells along one side of a world with a [`HeightSource`]: the same as brushes
+    /// [reach](crate::lattice::REACH).
+    ///
+    /// Positions in 1/4096 voxel, counted from the world's origin, would fit 32 bits up to 524,287 voxels. But a
+    /// [`Brush`](crate::brush::Brush) says where it is in `f32`, which holds places to 1/256 voxel up to 65,536
+    /// voxels from the origin, and to 1/64 voxel at the far end of such a world. Meshes are stored relative to
+    /// their own origins and lose nothing; a camera that goes that far needs an origin that follows it, as in any
+    /// game with `f32` transforms.
+    pub const MAX_SOURCE_SIZE: u32 = super::MAX_SOURCE_SIZE;
+
     /// The ground with these heights, one for each column of the extent, each within the lattice's limit.
     pub(super) fn new(extent: Extent, heights: Vec<i32>) -> Self {
         let range = |a: (i32, i32), b: (i32, i32)| (a.0.min(b.0), a.1.max(b.1));

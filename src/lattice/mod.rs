@@ -21,9 +21,12 @@ mod region;
 mod tables;
 
 pub use boxes::LatticeBox;
-pub use grid::{BrickPos, ChunkGrid, ChunkPos, TilePos};
+#[doc(hidden)]
+pub use grid::ChunkGrid;
+pub use grid::{BrickPos, ChunkPos, TilePos};
 pub(crate) use parallel::{ItemCost, parallel_map, parallel_map_into, pieces, side_by_side};
 pub(crate) use places::{sort_by_place, sort_permutation};
+#[doc(hidden)]
 pub use region::RegionPos;
 pub(crate) use tables::{shrink_if_sparse, table_bytes};
 

@@ -24,6 +24,10 @@ mod search;
 
 use std::sync::Arc;
 
+#[cfg(feature = "plugin")]
+use bevy::ecs::reflect::ReflectComponent;
+#[cfg(feature = "plugin")]
+use bevy::reflect::std_traits::ReflectDefault;
 use glam::IVec3;
 use serde::{Deserialize, Serialize};
 
@@ -46,7 +50,30 @@ use search::{Budget, Component, Solid};
 /// four times `largest` voxels together, or 131,072 if that is more. Pieces beyond these bounds stay as ground, and
 /// [`Applied::has_unsearched`](crate::terrain::Applied::has_unsearched) reports that there may be some. A later dig
 /// next to them finds them.
+///
+/// A model gets them with [`Terrain::set_loose`](crate::terrain::Terrain::set_loose), and lists the pieces in receipts.
+/// With the feature `plugin` they are also a component: on a terrain's entity they make brushes look for pieces, and a
+/// `LoosePieceFound` message is sent for each. Brushes that a game [applies](crate::terrain::Terrain::apply) itself
+/// look for pieces too, but these are only listed in the receipts: no message is sent, and none falls as debris. A
+/// terrain that is not spawned yet does not have the component: set the same settings on it before you replay a
+/// journal.
+///
+/// ```
+/// # #[cfg(feature = "plugin")] {
+/// # use bevy::prelude::*;
+/// # use bevy_burrow::prelude::*;
+/// # fn system(mut commands: Commands, terrain: Terrain) {
+/// // Crumbs vanish, larger pieces break off, and pieces of more than 4096 voxels stay.
+/// commands.spawn((terrain, LooseSettings { crumbs: 8, debris: 4096, ..default() }));
+/// # }
+/// # }
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(
+    feature = "plugin",
+    derive(bevy::prelude::Component, bevy::reflect::Reflect),
+    reflect(Component, Default)
+)]
 #[serde(default, deny_unknown_fields)]
 pub struct LooseSettings {
     /// The largest piece to look for, in voxels. Larger ones count as anchored; this bounds the time of a search.

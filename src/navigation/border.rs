@@ -7,7 +7,7 @@
 use rustc_hash::FxHashMap;
 
 use super::links::Axis;
-use super::tiles::NAV_TILE;
+use super::tiles::NavTilePos;
 use super::walkable::WalkableTile;
 use crate::lattice::{ONE, SNAP};
 
@@ -30,7 +30,7 @@ impl Border {
         let (floors, side) = (&tile.floors, tile.floors.side);
         let origin = tile.pos().origin();
         let start = (origin.z - floors.low.z) as usize * side + (origin.x - floors.low.x) as usize;
-        let size = NAV_TILE as usize;
+        let size = NavTilePos::SIZE as usize;
         for (first, step, along) in [
             (start, side, Axis::Z),
             (start + size, side, Axis::Z),

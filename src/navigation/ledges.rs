@@ -21,7 +21,7 @@ use super::border::FINE;
 use super::floors::SKY;
 use super::links::Axis;
 use super::settings::LedgeRules;
-use super::tiles::NAV_TILE;
+use super::tiles::NavTilePos;
 use super::walkable::WalkableTile;
 use crate::lattice::{Column, SNAP};
 
@@ -77,8 +77,8 @@ impl WalkableTile {
         let (origin, low, side) = (self.pos().origin(), self.floors.low, self.floors.side);
         let column = |cell: Column| (cell.z - low.z) as usize * side + (cell.x - low.x) as usize;
         let mut leaps = Vec::new();
-        for across in 0..NAV_TILE {
-            for along in 0..NAV_TILE {
+        for across in 0..NavTilePos::SIZE {
+            for along in 0..NavTilePos::SIZE {
                 // Along the ledge, which runs across the way.
                 let cell = match way.0 {
                     Axis::X => origin.offset(across, along),

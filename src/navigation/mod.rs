@@ -53,5 +53,5 @@ mod walkable;
 pub use ledges::LedgeLink;
 pub use polygons::NavPolygons;
 pub use settings::{WalkError, WalkSettings, Walker};
-pub use tiles::{NAV_TILE, NavTilePos};
+pub use tiles::NavTilePos;
 pub use walkable::{WalkableCell, WalkableTile};

@@ -4,7 +4,7 @@ use glam::IVec3;
 
 use super::border::{Border, FINE};
 use super::links::Axis;
-use super::tiles::{NAV_TILE, NavTilePos};
+use super::tiles::NavTilePos;
 use super::walkable::WalkableTile;
 use crate::lattice::SNAP;
 
@@ -74,7 +74,7 @@ struct Rectangle {
 }
 
 /// Columns along a side of a tile: the length of a row.
-const ROW: usize = NAV_TILE as usize + 1;
+const ROW: usize = NavTilePos::SIZE as usize + 1;
 
 impl WalkableTile {
     /// Polygons of the walkable cells.
@@ -129,7 +129,8 @@ impl WalkableTile {
         let mut rectangles = Vec::new();
         for (at, column) in self.columns() {
             let origin = self.pos().origin();
-            let room = [NAV_TILE - (at.x - origin.x), NAV_TILE - (at.z - origin.z)].map(|room| room as usize);
+            let room = [NavTilePos::SIZE - (at.x - origin.x), NavTilePos::SIZE - (at.z - origin.z)]
+                .map(|room| room as usize);
             for floor in self.floors.of(column) {
                 if is_free[floor] {
                     let rectangle = self.rectangle(floor, room, &is_free);

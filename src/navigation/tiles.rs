@@ -5,9 +5,6 @@ use crate::terrain::World;
 
 use super::settings::Walker;
 
-/// Cells along the sides of a navigation tile.
-pub const NAV_TILE: i32 = 32;
-
 /// The position of a navigation tile, in tiles. Its size does not depend on that of chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NavTilePos {
@@ -18,21 +15,24 @@ pub struct NavTilePos {
 }
 
 impl NavTilePos {
+    /// Cells along the sides of a tile.
+    pub const SIZE: i32 = 32;
+
     /// The tile of a cell.
     pub const fn of_cell(cell: Column) -> Self {
-        Self { x: cell.x.div_euclid(NAV_TILE), z: cell.z.div_euclid(NAV_TILE) }
+        Self { x: cell.x.div_euclid(Self::SIZE), z: cell.z.div_euclid(Self::SIZE) }
     }
 
     /// The tile's lowest cell.
     pub const fn origin(self) -> Column {
-        Column::new(self.x.saturating_mul(NAV_TILE), self.z.saturating_mul(NAV_TILE))
+        Column::new(self.x.saturating_mul(Self::SIZE), self.z.saturating_mul(Self::SIZE))
     }
 
     /// The tiles with cells of a rectangle of cells, both corners included, that belong to a world.
     pub fn covering(world: &World, low: Column, high: Column) -> impl Iterator<Item = Self> + use<> {
         let (width, depth) = (world.ground().width(), world.ground().depth());
         let along = |low: i32, high: i32, cells: i32| {
-            low.max(0).div_euclid(NAV_TILE)..=high.min(cells - 1).div_euclid(NAV_TILE)
+            low.max(0).div_euclid(Self::SIZE)..=high.min(cells - 1).div_euclid(Self::SIZE)
         };
         let (xs, zs) = (along(low.x, high.x, width), along(low.z, high.z, depth));
         zs.flat_map(move |z| xs.clone().map(move |x| Self { x, z }))

@@ -3,7 +3,7 @@
 use super::floors::Floors;
 use super::links::{Axis, Links};
 use super::settings::{LedgeRules, Walker};
-use super::tiles::{NAV_TILE, NavTilePos};
+use super::tiles::NavTilePos;
 use crate::lattice::Column;
 use crate::terrain::World;
 
@@ -35,7 +35,7 @@ impl WalkableTile {
         // The cells of a tile, those around it, and those that these and their ledges depend on.
         let around = walker.reach();
         let low = pos.origin().offset(-around, -around);
-        let side = (NAV_TILE + 2 * around + 1) as usize;
+        let side = (NavTilePos::SIZE + 2 * around + 1) as usize;
         let floors = Floors::new(world, low, side, walker.height);
         let links = Links::new(&floors, walker);
         let walkable = erode(&floors, &links, walker);
@@ -63,8 +63,8 @@ impl WalkableTile {
     /// The cells of the tile with the indices of their lowest columns, row by row.
     pub(super) fn columns(&self) -> impl Iterator<Item = (Column, usize)> + use<> {
         let (origin, low, side) = (self.pos.origin(), self.floors.low, self.floors.side);
-        (0..NAV_TILE).flat_map(move |z| {
-            (0..NAV_TILE).map(move |x| {
+        (0..NavTilePos::SIZE).flat_map(move |z| {
+            (0..NavTilePos::SIZE).map(move |x| {
                 let cell = origin.offset(x, z);
                 (cell, (cell.z - low.z) as usize * side + (cell.x - low.x) as usize)
             })

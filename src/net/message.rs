@@ -37,8 +37,8 @@ use crate::lattice::{BrickPos, ChunkPos, RegionPos};
 use crate::terrain::{EditSettings, Order, Patch};
 use crate::volume::{Brick, Fields};
 
-/// The version of the protocol. It changes whenever the encoding of messages does.
-pub const PROTOCOL: u32 = 6;
+/// See [`Server::PROTOCOL`](super::Server::PROTOCOL).
+pub(crate) const PROTOCOL: u32 = 6;
 
 /// The maximum size in bytes of a message to a server.
 pub const MAX_TO_SERVER: usize = 64 << 10;
@@ -150,9 +150,9 @@ pub struct Epoch {
 /// The greeting of a client that joins, or joins again after a gap.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Hello {
-    /// [`PROTOCOL`].
+    /// [`Server::PROTOCOL`](super::Server::PROTOCOL).
     pub protocol: u32,
-    /// [`SIMULATION`](crate::terrain::SIMULATION).
+    /// [`Terrain::SIMULATION`](crate::terrain::Terrain::SIMULATION).
     pub simulation: u32,
     /// [`Ground::hash`](crate::ground::Ground::hash).
     pub ground: u64,
@@ -386,10 +386,10 @@ pub enum Refusal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum KickReason {
-    /// The client speaks another [`PROTOCOL`].
+    /// The client speaks another [`Server::PROTOCOL`](super::Server::PROTOCOL).
     #[error("client and server have different versions of the protocol")]
     Protocol,
-    /// The client has another [`SIMULATION`](crate::terrain::SIMULATION).
+    /// The client has another [`Terrain::SIMULATION`](crate::terrain::Terrain::SIMULATION).
     #[error("client and server have different versions of the simulation")]
     Simulation,
     /// The client has another ground.

@@ -18,9 +18,8 @@
 //! A server that lets one client in and orders its dig:
 //!
 //! ```
-//! use bevy_burrow::net::{ClientId, Hello, PROTOCOL, Server, ServerSettings, ContentTable, ToClient, ToServer};
+//! use bevy_burrow::net::{ClientId, Hello, Server, ServerSettings, ContentTable, ToClient, ToServer};
 //! use bevy_burrow::prelude::*;
-//! use bevy_burrow::terrain::SIMULATION;
 //! use glam::{IVec3, Vec3};
 //! use std::sync::Arc;
 //! use std::time::Duration;
@@ -32,8 +31,8 @@
 //!
 //! // What a client sends, as bytes.
 //! let hello = Hello {
-//!     protocol: PROTOCOL,
-//!     simulation: SIMULATION,
+//!     protocol: Server::PROTOCOL,
+//!     simulation: Terrain::SIMULATION,
 //!     ground: ground.hash(),
 //!     chunk_size: 32,
 //!     epoch: None,
@@ -76,7 +75,7 @@ pub use bulk::BulkReader;
 pub use client::{Client, ClientEvent, ClientFigures};
 #[doc(hidden)]
 pub use message::MAX_TO_SERVER;
-pub use message::{ClientId, KickReason, Lane, PROTOCOL, Refusal};
+pub use message::{ClientId, KickReason, Lane, Refusal};
 #[doc(hidden)]
 pub use message::{
     Entries, Entry, Epoch, Hello, Join, MAX_SEQUENCE_JUMP, RegionContent, RegionHashes, RuleState, ToClient,

@@ -8,7 +8,7 @@ use super::open_level::{Files, LevelState};
 use super::state::{BurrowPanel, Note, PanelAction};
 use super::texts;
 use crate::format::Level;
-use crate::store::{StoreError, load_level, save_level};
+use crate::store::StoreError;
 use crate::terrain::{Terrain, TerrainError, TerrainSettings, WorldParts};
 use crate::threads::{ThreadTask, Threads};
 
@@ -50,7 +50,7 @@ pub(super) fn save(
         let level = Level::of_parts(WorldParts::of(&world, edit_settings), voxel_size, &world);
         // While a snapshot is held, commits have to copy the world's index.
         drop(world);
-        save_level(&path, &level).map(drop)
+        level.save(&path).map(drop)
     });
     commands.insert_resource(LevelTask::Save(task, folder, entity, state));
 }
@@ -67,7 +67,7 @@ pub(super) fn load(
         return;
     }
     let load = move || {
-        let level = load_level(&path, &ground).map_err(|why| why.to_string())?;
+        let level = Level::load(&path, &ground).map_err(|why| why.to_string())?;
         if level.ground != ground.hash() {
             return Err(texts::OTHER_GROUND.to_owned());
         }

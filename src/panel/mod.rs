@@ -66,10 +66,9 @@ use bevy_egui::egui::{self, Align2, Color32, Id, LayerId, Order, ScrollArea, Ui,
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
 
 use crate::plugin::{
-    BrushApplied, BurrowFigures, BurrowSettings, BurrowSystems, CommitSameFrame, LooseGround, MaterialColors,
-    Redo, Undo,
+    BrushApplied, BurrowFigures, BurrowSettings, BurrowSystems, CommitSameFrame, MaterialColors, Redo, Undo,
 };
-use crate::terrain::Terrain;
+use crate::terrain::{LooseSettings, Terrain};
 use crate::view::GroundLook;
 use handles::Handles;
 use open_level::Files;
@@ -261,7 +260,7 @@ fn draw(
     survey: Res<Survey>,
     mut files: ResMut<Files>,
     terrains: Query<(Entity, &Terrain)>,
-    parts: Query<(Option<&Name>, Option<&MaterialColors>, Option<&LooseGround>, Option<&GroundLook>)>,
+    parts: Query<(Option<&Name>, Option<&MaterialColors>, Option<&LooseSettings>, Option<&GroundLook>)>,
     mut places: ResMut<PanelPlaces>,
     #[cfg(feature = "scatter")] plants: Query<(&crate::plants::Plants, &crate::plants::ShownPlants)>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,

@@ -6,7 +6,7 @@ use super::terrain_controls::TerrainControls;
 use super::texts;
 use super::widgets::{count, figure, metres, section, slider, swatches, switch};
 use crate::ground::MaterialId;
-use crate::plugin::LooseGround;
+use crate::terrain::LooseSettings;
 use crate::volume::DiggingRules;
 
 /// Draws both sections. `material` is the index of the material whose rules are shown.
@@ -69,10 +69,10 @@ fn rules(
     }
 }
 
-fn loose(ui: &mut Ui, loose: &mut Option<LooseGround>) {
+fn loose(ui: &mut Ui, loose: &mut Option<LooseSettings>) {
     let mut is_on = loose.is_some();
     if switch(ui, texts::LOOSE_FIND, &mut is_on).changed() {
-        *loose = is_on.then(LooseGround::default);
+        *loose = is_on.then(LooseSettings::default);
     }
     let Some(loose) = loose else { return };
     let sizes = [&mut loose.crumbs, &mut loose.debris, &mut loose.largest];

@@ -4,8 +4,7 @@ use bevy::ecs::system::Commands;
 use bevy::log::warn;
 use bevy::prelude::{Entity, EntityWorldMut};
 
-use crate::plugin::LooseGround;
-use crate::terrain::Terrain;
+use crate::terrain::{LooseSettings, Terrain};
 use crate::threads::free_later;
 use crate::view::GroundLook;
 use crate::volume::DiggingRules;
@@ -16,14 +15,14 @@ pub struct TerrainControls {
     pub rules: DiggingRules,
     /// Maximum size of the undo history, in bytes.
     pub undo_budget: usize,
-    pub loose: Option<LooseGround>,
+    pub loose: Option<LooseSettings>,
     pub look: Option<GroundLook>,
     #[cfg(feature = "scatter")]
     pub plants: Option<crate::scatter::ScatterRules>,
 }
 
 impl TerrainControls {
-    pub fn of(terrain: &Terrain, loose: Option<&LooseGround>, look: Option<&GroundLook>) -> Self {
+    pub fn of(terrain: &Terrain, loose: Option<&LooseSettings>, look: Option<&GroundLook>) -> Self {
         let rules = terrain.rules().cloned().unwrap_or_default();
         let undo_budget = terrain.undo_budget();
         Self {
@@ -42,7 +41,7 @@ impl TerrainControls {
         if self.loose != before.loose {
             match self.loose {
                 Some(loose) => terrain.try_insert(loose),
-                None => terrain.try_remove::<LooseGround>(),
+                None => terrain.try_remove::<LooseSettings>(),
             };
         }
         if let Some(look) = self.look.filter(|look| before.look.as_ref() != Some(look)) {
@@ -94,7 +93,7 @@ mod tests {
             TerrainControls::of(entity.get().expect("it is there"), entity.get(), entity.get())
         };
         let rules = DiggingRules::default().with_bedrock(i32::MIN).with_hardness(MaterialId(3), 9);
-        let loose = Some(LooseGround { crumbs: 5, ..LooseGround::default() });
+        let loose = Some(LooseSettings { crumbs: 5, ..LooseSettings::default() });
         let steps = [
             TerrainControls {
                 rules: rules.clone(),

@@ -7,7 +7,7 @@ use bevy::prelude::*;
 use super::build::TILES;
 use super::tiles::NavigationTiles;
 use super::{Navigation, NavigationArea, NavigationSource};
-use crate::navigation::{NAV_TILE, NavTilePos, Walker};
+use crate::navigation::{NavTilePos, Walker};
 use crate::plugin::{Places, Squares, TerrainEntities, are_same, position_on, voxel_metres};
 use crate::terrain::Terrain;
 
@@ -77,7 +77,7 @@ pub(super) fn choose_tiles(
                 let (mut near, ground) = (Squares::default(), world.ground());
                 for &source in &sources {
                     let key = |square: IVec2| NavTilePos { x: square.x, z: square.y };
-                    near.add(source, NAV_TILE, (ground.width(), ground.depth()), key);
+                    near.add(source, NavTilePos::SIZE, (ground.width(), ground.depth()), key);
                 }
                 tiles.sources = sources;
                 tiles.choose(near.wanted(|_| true), &near.kept, &mut commands);

@@ -8,10 +8,12 @@ use crate::lattice::SNAP;
 use crate::navigation::{LedgeLink, NavTilePos};
 use crate::plugin::Places;
 
-/// The kind of links along which agents jump down.
-pub const JUMP_DOWN: usize = 0;
-/// The kind of links along which agents climb up.
-pub const CLIMB_UP: usize = 1;
+impl Navigation {
+    /// The kind of animation links along which agents jump down.
+    pub const JUMP_DOWN: usize = 0;
+    /// The kind of animation links along which agents climb up.
+    pub const CLIMB_UP: usize = 1;
+}
 
 /// How much longer a metre of climbing is than one of walking, for the choice of paths.
 const CLIMBING: f32 = 4.0;
@@ -49,12 +51,15 @@ pub(super) fn spawn_links(
             [from + along, to - along]
         };
         let (top, bottom) = (ends(ledge.top, -0.5), ends(ledge.bottom, 0.5));
-        let kinds = [(ledge.is_jump, JUMP_DOWN, [top, bottom]), (ledge.is_climb, CLIMB_UP, [bottom, top])];
+        let kinds = [
+            (ledge.is_jump, Navigation::JUMP_DOWN, [top, bottom]),
+            (ledge.is_climb, Navigation::CLIMB_UP, [bottom, top]),
+        ];
         for (_, kind, edges) in kinds.into_iter().filter(|(is_there, ..)| *is_there) {
             let own = LedgeEdges { terrain: navigation.terrain, edges };
             let [start_edge, end_edge] = own.placed(place);
             let way = end_edge.0 - start_edge.0;
-            let steep = if kind == CLIMB_UP { CLIMBING } else { 1.0 };
+            let steep = if kind == Navigation::CLIMB_UP { CLIMBING } else { 1.0 };
             let link = AnimationLink3d {
                 start_edge,
                 end_edge,

@@ -11,8 +11,8 @@
 //! | [`Navigation`] | whose ground, for what agent, in which archipelago, and where |
 //! | [`NavigationSource`] | a place around which there are islands |
 //! | [`NavigationTiles`] | the loaded tiles |
-//! | [`archipelago_options`] | options for landmass that fit an agent |
-//! | [`JUMP_DOWN`], [`CLIMB_UP`] | kinds of landmass' animation links over ledges |
+//! | [`WalkSettings::archipelago_options`] | options for landmass that fit an agent |
+//! | [`Navigation::JUMP_DOWN`], [`Navigation::CLIMB_UP`] | kinds of landmass' animation links over ledges |
 
 mod build;
 mod choose;
@@ -21,7 +21,6 @@ mod ledges;
 mod tiles;
 
 pub use bevy_landmass;
-pub use ledges::{CLIMB_UP, JUMP_DOWN};
 pub use tiles::NavigationTiles;
 
 use std::time::Duration;
@@ -116,20 +115,23 @@ pub struct NavigationSource {
     pub radius: f32,
 }
 
-/// Options of an archipelago for agents with these settings, in metres, on ground with voxels of this size.
-///
-/// Agents are found on the ground within a step above and below, and within two voxels to its side: they may be pushed
-/// where the mesh, which keeps whole cells from walls, does not reach.
-pub fn archipelago_options(agent: &WalkSettings, voxel_size: f32) -> ArchipelagoOptions<ThreeD> {
-    let vertical = agent.step + 2.0 * agent.precision + 0.5 * voxel_size;
-    ArchipelagoOptions {
-        point_sample_distance: PointSampleDistance3d {
-            horizontal_distance: 2.0 * voxel_size,
-            distance_above: vertical,
-            distance_below: vertical.max(0.5 * agent.height),
-            vertical_preference_ratio: 2.0,
-            animation_link_max_vertical_distance: vertical,
-        },
-        ..bevy_landmass::FromAgentRadius::from_agent_radius(agent.radius.max(0.01))
+impl WalkSettings {
+    /// Options of an archipelago for agents with these settings, which are in metres, on ground with voxels of this
+    /// size.
+    ///
+    /// Agents are found on the ground within a step above and below, and within two voxels to its side: they may be
+    /// pushed where the mesh, which keeps whole cells from walls, does not reach.
+    pub fn archipelago_options(&self, voxel_size: f32) -> ArchipelagoOptions<ThreeD> {
+        let vertical = self.step + 2.0 * self.precision + 0.5 * voxel_size;
+        ArchipelagoOptions {
+            point_sample_distance: PointSampleDistance3d {
+                horizontal_distance: 2.0 * voxel_size,
+                distance_above: vertical,
+                distance_below: vertical.max(0.5 * self.height),
+                vertical_preference_ratio: 2.0,
+                animation_link_max_vertical_distance: vertical,
+            },
+            ..bevy_landmass::FromAgentRadius::from_agent_radius(self.radius.max(0.01))
+        }
     }
 }

@@ -16,10 +16,10 @@ use crate::surface::SurfaceMesh;
 use crate::terrain::{PieceFate, PieceId, Terrain};
 use crate::threads::{ThreadTask, Threads, panic_message};
 
-/// Makes ground that broke off fall as a rigid body. Put a [`LooseGround`](crate::plugin::LooseGround) on the terrain;
-/// its `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn from the
-/// frame in which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is built
-/// with the transaction; it is built on the main thread only if the game commits transactions itself.
+/// Makes ground that broke off fall as a rigid body. Put a [`LooseSettings`](crate::terrain::LooseSettings) on the
+/// terrain; its `debris` is the largest piece that falls, in voxels. If the app has `Assets<Mesh>`, a piece is drawn
+/// from the frame in which the ground loses it. It becomes a body as soon as a task has built its collider. Its mesh is
+/// built with the transaction; it is built on the main thread only if the game commits transactions itself.
 ///
 /// Matter is neither doubled nor lost: when a piece becomes ground again, by an undo of any player or because a server
 /// refused the dig, its debris is despawned wherever it has rolled, and no other is. A redo lets it fall again.
@@ -33,7 +33,7 @@ use crate::threads::{ThreadTask, Threads, panic_message};
 /// # use bevy_burrow::physics::{DebrisPlugin, DebrisSettings};
 /// # fn game(app: &mut App, terrain: Terrain) {
 /// app.add_plugins(DebrisPlugin).insert_resource(DebrisSettings { stay: 60.0, ..default() });
-/// app.world_mut().spawn((terrain, LooseGround { crumbs: 8, debris: 4096, ..default() }));
+/// app.world_mut().spawn((terrain, LooseSettings { crumbs: 8, debris: 4096, ..default() }));
 /// # }
 /// ```
 #[derive(Default)]

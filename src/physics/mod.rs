@@ -22,7 +22,7 @@
 //! | --- | --- |
 //! | ground to stand on | [`TerrainPhysicsPlugin`], and a [`ColliderSource`] on everything that moves about |
 //! | a first-person body | [`Character`], steered by [`CharacterSteering`], moved by [`CharacterPlugin`] |
-//! | ground that breaks off and falls | [`DebrisPlugin`], and `LooseGround` on the terrain; [`debris_collider`] for bodies of your own |
+//! | ground that breaks off and falls | [`DebrisPlugin`], and `LooseSettings` on the terrain; [`debris_collider`] for bodies of your own |
 //! | finding the terrain of a collider that was hit | [`GroundBody`] on the collider's entity |
 //! | live figures | [`PhysicsFigures`] |
 //! | bodies that cannot leave the terrain | [`EdgeWalls`] on the terrain |
@@ -78,7 +78,9 @@ pub use collider_source::ColliderSource;
 #[doc(hidden)]
 pub use debris::{Debris, DebrisCrumbled, DebrisOf, DebrisPlugin, DebrisSettings, TerrainDebris};
 pub use edge_walls::EdgeWalls;
-pub use ground::{GroundBody, GroundCollider, GroundContact, TerrainContact, TerrainPhysicsDisabled};
+#[doc(hidden)]
+pub use ground::GroundCollider;
+pub use ground::{GroundBody, GroundContact, TerrainContact, TerrainPhysicsDisabled};
 pub use hold::HeldByGround;
 #[doc(hidden)]
 pub use hull::debris_collider;

@@ -12,7 +12,8 @@
 //! | `PlantLooks`, `PlantDrawingPlugin` | meshes for species, and how they are drawn (feature `render`) |
 //! | `PlantCollidersPlugin` | stems as colliders, around `ColliderSource`s (feature `avian`) |
 //!
-//! A game removes a plant with [`Plant::removal`], which is a brush in voxels: see [`removal_of`].
+//! A game removes a plant with [`Plant::removal`], which is a brush in voxels, or with
+//! [`Plant::removal_in_world`].
 
 #[cfg(feature = "avian")]
 mod colliders;
@@ -175,8 +176,8 @@ pub struct PlantRemoved {
     pub plant: Plant,
     /// Where the plant stood, in world space: its foot, how it is turned, and its size.
     pub transform: Transform,
-    /// Whether a game felled it, as with [`removal_of`]: its ground and the air around it are as they were. `false` if
-    /// they were dug, built over or painted. See [`Scatter::is_felled`].
+    /// Whether a game felled it, as with [`Plant::removal_in_world`]: its ground and the air around it are as they
+    /// were. `false` if they were dug, built over or painted. See [`Scatter::is_felled`].
     pub is_felled: bool,
 }
 
@@ -191,15 +192,17 @@ pub struct PlantReturned {
     pub transform: Transform,
 }
 
-/// The brush that removes a plant, in world space: send it as a [`Brush`] message or
-/// [`TargetedBrush`](crate::plugin::TargetedBrush). See [`Plant::removal`].
-pub fn removal_of(plant: &Plant, terrain: &GlobalTransform) -> Brush {
-    to_world(plant.removal(), terrain)
-}
+impl Plant {
+    /// The brush that removes the plant, in world space: send it as a [`Brush`] message or
+    /// [`TargetedBrush`](crate::plugin::TargetedBrush). See [`removal`](Self::removal).
+    pub fn removal_in_world(&self, terrain: &GlobalTransform) -> Brush {
+        to_world(self.removal(), terrain)
+    }
 
-/// The brush that lets a removed plant grow again, in world space. See [`Plant::regrowth`].
-pub fn regrowth_of(plant: &Plant, terrain: &GlobalTransform) -> Brush {
-    to_world(plant.regrowth(), terrain)
+    /// The brush that lets the removed plant grow again, in world space. See [`regrowth`](Self::regrowth).
+    pub fn regrowth_in_world(&self, terrain: &GlobalTransform) -> Brush {
+        to_world(self.regrowth(), terrain)
+    }
 }
 
 /// The mark of a plant in world space.

@@ -204,7 +204,7 @@ pub struct EditOutbox {
 #[reflect(Component, Default)]
 pub struct SlimVertices;
 
-/// Whether the meshes of this terrain have [`ATTRIBUTE_SKY_LIGHT`](super::ATTRIBUTE_SKY_LIGHT): how much of the sky
+/// Whether the meshes of this terrain have [`Terrain::ATTRIBUTE_SKY_LIGHT`]: how much of the sky
 /// lights each vertex, so that pits, gullies and tunnels are darker than meadows, near and far, and as soon as they are
 /// dug. It takes 4 bytes a vertex. A `GroundLook` inserts it, unless the terrain has [`SkyLight::OFF`]; insert it
 /// yourself for a material of your own that reads the attribute. Servers and other apps without meshes compute no

@@ -15,7 +15,7 @@ use super::heightmap::{read_limited, register_loader};
 use super::{BeforeLoad, EditOutbox};
 use crate::ground::{
     ElevationGrid, ElevationScale, ElevationTile, Ground, GroundError, HeightFormat, IdOptions, ImportError,
-    ImportOptions, MaterialControl, MaterialMap, SplatOptions, TileEdges, tile_place,
+    ImportOptions, MaterialControl, MaterialMap, SplatOptions, TileEdges,
 };
 use crate::terrain::{Order, Request, Terrain, TerrainSettings};
 
@@ -186,7 +186,7 @@ async fn heights(
         if scale.is_none() {
             scale = Some(found.scale(description.voxel_size.unwrap_or(1.0)).map_err(failed)?);
         }
-        let place = if heights.len() == 1 { Some((0, 0)) } else { tile_place(name) };
+        let place = if heights.len() == 1 { Some((0, 0)) } else { ElevationTile::place_of(name) };
         let (column, row) = place.ok_or_else(|| GroundFileError::NoPlace(name.clone()))?;
         tiles.push(ElevationTile { column, row, grid });
     }

@@ -89,9 +89,9 @@ pub struct HistoryMoved {
     pub receipt: Receipt,
 }
 
-/// A brush cut off a piece of ground, on a terrain with [`LooseGround`](super::LooseGround). A piece that vanishes or
-/// breaks off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as well. A
-/// redo that cuts a piece off again sends this again, with the same [id](LoosePiece::id).
+/// A brush cut off a piece of ground, on a terrain with [`LooseSettings`](crate::terrain::LooseSettings). A piece that
+/// vanishes or breaks off is gone from the ground in the frame of this message. The brush's receipt lists its pieces as
+/// well. A redo that cuts a piece off again sends this again, with the same [id](LoosePiece::id).
 #[derive(Message, Reflect, Clone, Debug, PartialEq)]
 #[reflect(Message, Clone, Debug, PartialEq)]
 pub struct LoosePieceFound {

@@ -7,8 +7,8 @@
 //! everything but the meshes.
 //!
 //! [`Undo`] and [`Redo`] messages work by whole strokes, and are answered by [`HistoryMoved`]. On terrains with
-//! [`LooseGround`], a [`LoosePieceFound`] is sent for each piece that a brush cuts off, and a [`LoosePieceReturned`]
-//! for each that an undo brings back.
+//! [`LooseSettings`](crate::terrain::LooseSettings), a [`LoosePieceFound`] is sent for each piece that a brush cuts
+//! off, and a [`LoosePieceReturned`] for each that an undo brings back.
 //!
 //! Tiles, chunks and [`GroundPiece`]s inherit components of the terrain's entity: a `MeshMaterial3d`, [`RenderLayers`],
 //! and, with the feature `render`, `NotShadowCaster` and `NotShadowReceiver`. They follow when such a component is
@@ -19,12 +19,12 @@
 //! [`Terrain`]: crate::terrain::Terrain
 //!
 //! A [`SurfaceProcessor`] builds extra data for each surface off-thread, and swaps it in with the mesh. Figures are in
-//! [`BurrowFigures`], and in Bevy's [`diagnostics`]; transactions, edits, meshes, commits and loads have tracing spans.
+//! [`BurrowFigures`], and in Bevy's diagnostics; transactions, edits, meshes, commits and loads have tracing spans.
 
 // Files with reflected types, assets and loaders stay in this folder: scenes and `.meta` files name those by the path
 // of their module.
 mod components;
-pub mod diagnostics;
+mod diagnostics;
 mod entities;
 mod figures;
 #[cfg(feature = "format")]
@@ -84,9 +84,6 @@ pub(crate) use lod_state::WantedTiles;
 pub use lod_state::{DetailSource, LevelsOfDetail, ShownLevels};
 #[doc(hidden)]
 pub use meshes::CUT_VOXELS;
-pub use meshes::{
-    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
-};
 pub use meshes::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
 #[doc(hidden)]
 pub use messages::{
@@ -94,13 +91,14 @@ pub use messages::{
     LoosePieceFound, LoosePieceReturned, Redo, TargetedBrush, TerrainReady, Undo,
 };
 #[cfg(feature = "picking")]
+#[doc(hidden)]
 pub use picking::TerrainPickingPlugin;
 pub use query::{TerrainHit, Terrains};
 #[cfg(any(feature = "scatter", feature = "landmass"))]
 pub(crate) use schedule::commit::GroundChanged;
 pub use schedule::redraw::Redraw;
 pub(crate) use schedule::same_frame::CommitSameFrame;
-pub use settings::{BurrowEngine, BurrowSettings, LooseGround};
+pub use settings::{BurrowEngine, BurrowSettings};
 #[doc(hidden)]
 pub use times::Times;
 
@@ -167,6 +165,7 @@ pub(crate) enum BeforeLoad {
 pub(crate) struct FollowCommits;
 
 /// Transactions, entities and messages; works in `MinimalPlugins`.
+#[doc(hidden)]
 #[derive(Default)]
 pub struct TerrainPlugin;
 

@@ -1,4 +1,4 @@
-//! Settings, as resources and components.
+//! Settings, as resources.
 
 use std::time::Duration;
 
@@ -6,7 +6,6 @@ use bevy::asset::RenderAssetUsages;
 use bevy::prelude::*;
 
 use crate::backend::{Backend, Engine};
-use crate::terrain::LooseSettings;
 
 /// The engine of terrains without their own engine. [`Backend::Auto`] unless the game inserts
 /// another one, best before the plugins; [`Engine::state`] and [`Engine::figures`] show what it does.
@@ -61,46 +60,5 @@ impl Default for BurrowSettings {
             mesh_usages: RenderAssetUsages::RENDER_WORLD,
             same_frame: Duration::from_micros(300),
         }
-    }
-}
-
-/// Makes brushes look for pieces of ground that they cut off: insert it on a terrain's entity, and a
-/// [`LoosePieceFound`] is sent for each piece. Brushes that a game [applies](crate::terrain::Terrain::apply) itself
-/// look for pieces too, but these are only listed in the receipts: no message is sent, and none falls as debris. A
-/// terrain that is not spawned yet does not have this component: call `terrain.set_loose(Some(loose.into()))` before
-/// you replay a journal on it.
-///
-/// ```
-/// # use bevy::prelude::*;
-/// # use bevy_burrow::prelude::*;
-/// # fn system(mut commands: Commands, terrain: Terrain) {
-/// // Crumbs vanish, larger pieces break off, and pieces of more than 4096 voxels stay.
-/// commands.spawn((terrain, LooseGround { crumbs: 8, debris: 4096, ..default() }));
-/// # }
-/// ```
-///
-/// [`LoosePieceFound`]: super::LoosePieceFound
-#[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]
-#[reflect(Component, Default)]
-pub struct LooseGround {
-    /// The largest piece to look for, in voxels; larger pieces count as connected. It limits the time of a search.
-    pub largest: u32,
-    /// Pieces up to this many voxels vanish.
-    pub crumbs: u32,
-    /// Larger pieces up to this many voxels are removed from the ground and come with a closed mesh. Others stay.
-    pub debris: u32,
-}
-
-impl Default for LooseGround {
-    /// Pieces are reported, and stay.
-    fn default() -> Self {
-        let LooseSettings { largest, crumbs, debris } = LooseSettings::default();
-        Self { largest, crumbs, debris }
-    }
-}
-
-impl From<LooseGround> for LooseSettings {
-    fn from(LooseGround { largest, crumbs, debris }: LooseGround) -> Self {
-        Self { largest, crumbs, debris }
     }
 }

@@ -13,7 +13,7 @@ use bevy::prelude::*;
 
 use super::components::{WorldStore, hold_now, warn_without_plugin};
 use crate::format::limits::Limits;
-use crate::format::{FormatError, Level, LevelFiles, pack_level, read_level, unpack_level};
+use crate::format::{FormatError, Level, LevelFiles};
 use crate::plugin::read_limited;
 use crate::store::RestoreLevelError;
 use crate::terrain::{Terrain, Version};
@@ -30,7 +30,7 @@ impl BurrowLevel {
     /// # Errors
     /// When settings hold numbers that can't be written.
     pub fn new(level: &Level) -> Result<Self, FormatError> {
-        crate::format::write_level(level).map(Self)
+        level.to_files().map(Self)
     }
 
     /// A terrain of the level over the ground that it was made on.
@@ -42,7 +42,7 @@ impl BurrowLevel {
         ground: impl Into<Arc<crate::ground::Ground>>,
     ) -> Result<Terrain, RestoreLevelError> {
         let ground = ground.into();
-        Ok(read_level(&self.0, &ground)?.terrain(ground)?)
+        Ok(Level::from_files(&self.0, &ground)?.terrain(ground)?)
     }
 }
 
@@ -74,7 +74,7 @@ impl AssetLoader for LevelLoader {
         _: &mut LoadContext<'_>,
     ) -> Result<BurrowLevel, LevelError> {
         let bytes = read_limited(reader, Limits::FORMAT.packed_level as u64).await?;
-        Ok(BurrowLevel(unpack_level(&bytes)?))
+        Ok(BurrowLevel(Level::unpack_files(&bytes)?))
     }
 
     fn extensions(&self) -> &[&str] {
@@ -99,7 +99,7 @@ impl AssetSaver for LevelSaver {
         (): &(),
         _: AssetPath<'_>,
     ) -> Result<(), LevelError> {
-        writer.write_all(&pack_level(&asset.0)?).await?;
+        writer.write_all(&Level::pack_files(&asset.0)?).await?;
         Ok(())
     }
 }

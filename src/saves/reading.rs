@@ -8,7 +8,7 @@ use bevy::prelude::*;
 
 use super::components::{LevelId, SavedWorld};
 use super::level::BurrowLevel;
-use crate::format::read_level;
+use crate::format::Level;
 use crate::store::{BaseLevel, Folder, Progress, Store, StoreError, StoreOptions, StoreWarning};
 use crate::terrain::{self, EditSettings, Terrain, TerrainSettings, Version, WorldParts};
 use crate::threads::{ThreadTask, Threads, free_later};
@@ -155,8 +155,8 @@ impl WorldReader {
         let ground = &world.shared_ground();
         // An unreadable level was reported when the terrain was built from it.
         let level = level.as_ref();
-        let level =
-            level.and_then(|(level, path)| Some(BaseLevel::new(read_level(&level.0, ground).ok()?, path)));
+        let level = level
+            .and_then(|(level, path)| Some(BaseLevel::new(Level::from_files(&level.0, ground).ok()?, path)));
         let options = StoreOptions { level, progress: Some(progress.clone()), ..saved.options() };
         if !Store::is_in(folder.path()) {
             let settings = TerrainSettings { chunk_size: id.chunk_size, voxel_size: id.voxel_size };

@@ -8,7 +8,7 @@ use super::base_level::{BaseLevel, LevelName};
 use super::error::{StoreError, StoreWarning};
 use super::files::{Files, Folder};
 use super::journal::segment::{self, Bad};
-use super::open_store::read;
+use super::open_store::{Store, read};
 use super::options::{BaseChanged, StoreOptions};
 use super::recovery::{Contents, recover, replay_all};
 use super::regions::keys;
@@ -29,7 +29,7 @@ pub struct WorldInfo {
     pub hash: u64,
     /// The sizes of its chunks and voxels.
     pub settings: TerrainSettings,
-    /// The [`SIMULATION`](crate::terrain::SIMULATION) that saved it.
+    /// The [`Terrain::SIMULATION`](crate::terrain::Terrain::SIMULATION) that saved it.
     pub simulation: u32,
     /// Hash of its ground.
     pub ground: u64,
@@ -55,12 +55,28 @@ pub struct WorldInfo {
     pub damage: Vec<String>,
 }
 
-/// Reads facts about the world in a folder, without its ground.
-///
-/// # Errors
-/// When there is none, when it is open, and when nothing of it can be read.
-pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
-    inspect_in(&Folder::new(folder.as_ref()))
+impl Store {
+    /// Reads facts about the world in a folder, without its ground.
+    ///
+    /// # Errors
+    /// When there is none, when it is open, and when nothing of it can be read.
+    pub fn inspect(folder: impl AsRef<Path>) -> Result<WorldInfo, StoreError> {
+        inspect_in(&Folder::new(folder.as_ref()))
+    }
+
+    /// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions,
+    /// the journal's tail, and, if it is whole, the log from the first commit on.
+    ///
+    /// # Errors
+    /// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
+    #[doc(hidden)]
+    pub fn check(
+        folder: impl AsRef<Path>,
+        ground: impl Into<Arc<Ground>>,
+        level: Option<&BaseLevel>,
+    ) -> Result<WorldCheck, StoreError> {
+        check_in(&Folder::new(folder.as_ref()), ground, level)
+    }
 }
 
 /// Inspects a world in other [files](Files).
@@ -158,19 +174,6 @@ pub struct WorldCheck {
     pub replays: Option<bool>,
 }
 
-/// Reads all of the world in a folder, over its ground and its level if it has one, without changing it: regions, the
-/// journal's tail, and, if it is whole, the log from the first commit on.
-///
-/// # Errors
-/// When there is none, when it is open, when its ground is another one, and when nothing of it can be read.
-pub fn check(
-    folder: impl AsRef<Path>,
-    ground: impl Into<Arc<Ground>>,
-    level: Option<&BaseLevel>,
-) -> Result<WorldCheck, StoreError> {
-    check_in(&Folder::new(folder.as_ref()), ground, level)
-}
-
 /// Checks a world in other [files](Files).
 ///
 /// # Errors
@@ -187,7 +190,7 @@ pub fn check_in(
 /// its log from the first commit on.
 ///
 /// # Errors
-/// As for [`check`].
+/// As for [`Store::check`].
 pub fn read_world(
     folder: impl AsRef<Path>,
     ground: impl Into<Arc<Ground>>,

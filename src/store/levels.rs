@@ -45,6 +45,36 @@ impl Level {
     pub fn terrain(&self, ground: impl Into<Arc<Ground>>) -> Result<Terrain, RestoreError> {
         Terrain::restore(ground, &self.settings, self.parts())
     }
+
+    /// Writes the level to a folder, one file for each region, so that version control stores and shows the changes.
+    /// Unchanged files are not written, and files of regions that became empty are removed. Nothing else in the folder
+    /// is touched.
+    ///
+    /// After a crash the folder holds the old level or the new one: new files are complete before the first of the old
+    /// ones is touched, and [`load`](Self::load) reads new files that have not replaced the old ones yet.
+    ///
+    /// # Errors
+    /// When a file can't be written, or the folder has no name.
+    pub fn save(&self, folder: impl AsRef<Path>) -> Result<(), StoreError> {
+        let folder = folder.as_ref();
+        if folder.as_os_str().is_empty() {
+            let why = io::Error::new(io::ErrorKind::InvalidInput, "the folder has no name");
+            return Err(StoreError::files("creating the level's folder")(why));
+        }
+        let files = self.to_files()?;
+        fs::create_dir_all(folder).map_err(StoreError::files("creating the level's folder"))?;
+        Pending::finish(folder)?;
+        Pending::prepare(folder, &files)?;
+        Pending::finish(folder)
+    }
+
+    /// Reads a level over its ground, from a folder or from a packed file.
+    ///
+    /// # Errors
+    /// When there is no level, when its files can't be read, and when they are damaged.
+    pub fn load(path: impl AsRef<Path>, ground: &Ground) -> Result<Self, StoreError> {
+        Ok(Self::from_files(&read_level_files(path)?, ground)?)
+    }
 }
 
 /// The file that lists the remaining steps of a save.
@@ -153,28 +183,6 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) { fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
-/// Writes a level to a folder, one file for each region, so that version control stores and shows the changes.
-/// Unchanged files are not written, and files of regions that became empty are removed. Nothing else in the folder is
-/// touched.
-///
-/// After a crash the folder holds the old level or the new one: new files are complete before the first of the old ones
-/// is touched, and [`read_level_files`] reads new files that have not replaced the old ones yet.
-///
-/// # Errors
-/// When a file can't be written, or the folder has no name.
-pub fn save_level(folder: impl AsRef<Path>, level: &Level) -> Result<(), StoreError> {
-    let folder = folder.as_ref();
-    if folder.as_os_str().is_empty() {
-        let why = io::Error::new(io::ErrorKind::InvalidInput, "the folder has no name");
-        return Err(StoreError::files("creating the level's folder")(why));
-    }
-    let files = level::write_level(level)?;
-    fs::create_dir_all(folder).map_err(StoreError::files("creating the level's folder"))?;
-    Pending::finish(folder)?;
-    Pending::prepare(folder, &files)?;
-    Pending::finish(folder)
-}
-
 /// Reads the files of a level: of a folder, or of a packed file.
 ///
 /// # Errors
@@ -188,7 +196,7 @@ pub fn read_level_files(path: impl AsRef<Path>) -> Result<LevelFiles, StoreError
         if size > limit {
             return Err(FormatError::TooLarge { length: size, limit }.into());
         }
-        return Ok(level::unpack_level(&fs::read(path).map_err(read)?)?);
+        return Ok(Level::unpack_files(&fs::read(path).map_err(read)?)?);
     }
     let pending = Pending::read(path)?.unwrap_or_default();
     let names = fs::read_dir(path).map_err(read)?.flatten();
@@ -206,14 +214,6 @@ pub fn read_level_files(path: impl AsRef<Path>) -> Result<LevelFiles, StoreError
     Ok(files)
 }
 
-/// Reads a level over its ground, from a folder or from a packed file.
-///
-/// # Errors
-/// When there is no level, when its files can't be read, and when they are damaged.
-pub fn load_level(path: impl AsRef<Path>, ground: &Ground) -> Result<Level, StoreError> {
-    Ok(level::read_level(&read_level_files(path)?, ground)?)
-}
-
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
@@ -225,7 +225,7 @@ mod tests {
     /// Copies of a folder at each step of saving a level.
     fn steps(folder: &Path, new: &Level) -> Vec<LevelFiles> {
         let mut seen = vec![read_level_files(folder).unwrap()];
-        Pending::prepare(folder, &level::write_level(new).unwrap()).unwrap();
+        Pending::prepare(folder, &new.to_files().unwrap()).unwrap();
         seen.push(read_level_files(folder).unwrap());
         let pending = Pending::read(folder).unwrap().unwrap();
         for path in pending.changed.iter().map(|name| folder.join(name)) {
@@ -252,13 +252,13 @@ mod tests {
         };
         let (old, new) = (level(&[30.0, 100.0]), level(&[100.0, 101.0, 170.0]));
         assert!(
-            save_level("", &old).is_err() && !new_of(Path::new(level::LEVEL_JSON)).exists(),
+            old.save("").is_err() && !new_of(Path::new(level::LEVEL_JSON)).exists(),
             "a folder without a name"
         );
         let folder = std::env::temp_dir().join(format!("bevy_burrow_level_{}", std::process::id()));
         drop(fs::remove_dir_all(&folder));
-        save_level(&folder, &old).unwrap();
-        let [before, after] = [&old, &new].map(|own| level::write_level(own).unwrap());
+        old.save(&folder).unwrap();
+        let [before, after] = [&old, &new].map(|own| own.to_files().unwrap());
         let seen = steps(&folder, &new);
         assert!(seen.len() > 5 && seen[0] == before);
         assert!(seen[1..].iter().all(|own| *own == after));
@@ -266,7 +266,7 @@ mod tests {
         assert_eq!(left, after.len(), "nothing is left over");
         // The next save finishes an interrupted one.
         Pending::prepare(&folder, &before).unwrap();
-        save_level(&folder, &new).unwrap();
+        new.save(&folder).unwrap();
         assert_eq!(read_level_files(&folder).unwrap(), after);
         fs::remove_dir_all(&folder).unwrap();
     }

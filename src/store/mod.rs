@@ -18,20 +18,21 @@ mod store_thread;
 pub use base_level::BaseLevel;
 #[doc(hidden)]
 pub use base_level::LevelName;
-pub use error::{StoreError, StoreWarning, WorldSize};
+#[doc(hidden)]
+pub use error::WorldSize;
+pub use error::{StoreError, StoreWarning};
 #[cfg(any(test, feature = "tools"))]
 #[doc(hidden)]
 pub use files::{DiskFault, DiskImage, SimulatedDisk};
 #[doc(hidden)]
 pub use files::{Files, Folder, Lock, OpenFile, Opening};
-pub use inspect::{WorldCheck, WorldInfo, check, inspect};
+pub use inspect::WorldInfo;
 #[doc(hidden)]
-pub use inspect::{check_in, inspect_in, read_world, replay};
+pub use inspect::{WorldCheck, check_in, inspect_in, read_world, replay};
 #[doc(hidden)]
-pub use levels::read_level_files;
-pub use levels::{RestoreLevelError, load_level, save_level};
+pub use levels::{RestoreLevelError, read_level_files};
 pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
-pub use portable::{Imported, from_bytes, to_bytes};
+pub use portable::WorldFile;
 pub use progress::Progress;
 pub use store_thread::{ClosingStore, SavePoint};

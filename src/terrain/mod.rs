@@ -57,13 +57,15 @@ pub use crate::surface::ChunkSurface;
 pub(crate) use crate::world::brick_over;
 #[cfg(any(feature = "plugin", test))]
 pub(crate) use crate::world::unique;
-pub use crate::world::{GlbError, SplatMaps};
-pub use crate::world::{Memory, Meshing, Patch, RayHit, Span, TerrainError, TerrainSettings, World};
 #[doc(hidden)]
-pub use crate::world::{MeshKey, Version};
+pub use crate::world::{GlbError, MeshKey, Version};
+pub use crate::world::{
+    Memory, Meshing, Patch, RayHit, Span, SplatMaps, TerrainError, TerrainSettings, World,
+};
 pub use commit::Commit;
 #[doc(hidden)]
 pub use draft::Draft;
+#[doc(hidden)]
 pub use edit_settings::EditSettings;
 pub use history::History;
 pub use model::{StaleCommit, Terrain};
@@ -74,8 +76,13 @@ pub(crate) use pending_display::PendingDisplay;
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
-pub use receipt::{Applied, Asked, ChunkScenario, Receipt, Rejection, ScenarioCounts};
-pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
+#[doc(hidden)]
+pub use receipt::ChunkScenario;
+pub use receipt::{Applied, Asked, Receipt, Rejection, ScenarioCounts};
+#[doc(hidden)]
+pub use record::WorldParts;
+pub use record::{CommitRecord, LogEntry};
+#[doc(hidden)]
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]
 pub use resolve::FieldChange;

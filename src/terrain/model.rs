@@ -86,6 +86,10 @@ pub(super) struct InFlight {
 }
 
 impl Terrain {
+    /// Changes when the same edits of the same ground no longer give the same [hash](World::hash): a log that was
+    /// written under another number can't be replayed.
+    pub const SIMULATION: u32 = 2;
+
     /// A terrain without edits.
     ///
     /// # Errors

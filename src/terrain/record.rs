@@ -6,10 +6,6 @@ use super::edit_settings::EditSettings;
 use super::order::Order;
 use crate::world::Patch;
 
-/// Changes when the same edits of the same ground no longer give the same [hash](super::World::hash): a log that was
-/// written under another number can't be replayed.
-pub const SIMULATION: u32 = 2;
-
 /// One item of a commit. Items of one commit apply in order.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]

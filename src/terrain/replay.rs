@@ -45,7 +45,7 @@ pub enum ReplayError {
         found: u64,
     },
     /// The world has another hash than the record says: it is another world, or the record was written by a version of
-    /// the crate with another [`SIMULATION`](super::SIMULATION).
+    /// the crate with another [`Terrain::SIMULATION`].
     #[error("revision {revision} has the hash {found:#018x} here, but {expected:#018x} in the record")]
     Hash {
         /// The record's revision.
@@ -89,6 +89,7 @@ impl WorldParts {
 impl Terrain {
     /// All of the world but its ground, as [`restore`](Self::restore) takes it. Bricks are shared, not copied. History
     /// and what waits are not part of it.
+    #[doc(hidden)]
     pub fn parts(&self) -> WorldParts {
         WorldParts::of(&self.world, self.edit_settings.clone())
     }
@@ -101,6 +102,7 @@ impl Terrain {
     ///
     /// # Errors
     /// When settings or rules are out of range, or when parts do not fit this ground.
+    #[doc(hidden)]
     pub fn restore(
         ground: impl Into<Arc<Ground>>,
         settings: &TerrainSettings,

@@ -16,9 +16,9 @@ use crate::plugin::propagate_material;
 ///
 /// `BurrowPlugins` contain it for `StandardMaterial`; add it for each material type of your own, before or after Bevy's
 /// plugins. Vertex colours carry the terrain's [`MaterialColors`](crate::plugin::MaterialColors); the attributes
-/// [`ATTRIBUTE_MATERIAL_IDS`](crate::plugin::ATTRIBUTE_MATERIAL_IDS) and
-/// [`ATTRIBUTE_MATERIAL_WEIGHTS`](crate::plugin::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders. A material with a
-/// vertex shader of its own also needs [`prepass_vertex_shader`](super::prepass_vertex_shader).
+/// [`Terrain::ATTRIBUTE_MATERIAL_IDS`](crate::terrain::Terrain::ATTRIBUTE_MATERIAL_IDS) and
+/// [`Terrain::ATTRIBUTE_MATERIAL_WEIGHTS`](crate::terrain::Terrain::ATTRIBUTE_MATERIAL_WEIGHTS) are there for shaders.
+/// A material with a vertex shader of its own also needs [`prepass_vertex_shader`](super::prepass_vertex_shader).
 pub struct TerrainMaterialPlugin<M: Material>(PhantomData<fn() -> M>);
 
 impl<M: Material> Default for TerrainMaterialPlugin<M> {

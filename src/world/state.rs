@@ -127,6 +127,7 @@ impl World {
     }
 
     /// The grid of chunks and tiles.
+    #[doc(hidden)]
     pub fn grid(&self) -> ChunkGrid {
         self.grid
     }
@@ -193,8 +194,8 @@ impl World {
         self.bricks.iter().map(|(&pos, brick)| (pos, brick.as_ref()))
     }
 
-    /// The chunks that draw something, in no order. Of a world that was [restored](crate::terrain::Terrain::restore),
-    /// or whose terrain [never meshes](crate::terrain::Meshing::Never), some may turn out to draw nothing.
+    /// The chunks that draw something, in no order. Of a world that was restored, or whose terrain
+    /// [never meshes](crate::terrain::Meshing::Never), some may turn out to draw nothing.
     pub fn drawn_chunks(&self) -> impl Iterator<Item = ChunkPos> {
         self.meshes.maybe_drawn()
     }

@@ -23,7 +23,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     studio.terrain(ground, GroundLook::default());
     let world = studio.app.world_mut();
     let terrain = world.query_filtered::<Entity, With<Terrain>>().single(world).expect("one terrain");
-    world.entity_mut(terrain).insert(LooseGround { debris: 100_000, largest: 100_000, ..default() });
+    world.entity_mut(terrain).insert(LooseSettings { debris: 100_000, largest: 100_000, ..default() });
     // A trench around the block, with a vein in its inner wall, and then a cut below it from side to side.
     let middle = Vec3::new(48.0, 20.0, 48.0);
     let trench = |aside: Vec3, half: Vec3| Brush::dig(Shape::cuboid(middle + aside, half));

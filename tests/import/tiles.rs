@@ -1,6 +1,6 @@
 //! Tiles of several files.
 
-use bevy_burrow::ground::{ElevationGrid, ElevationTile, ImportError, ImportNote, TileEdges, tile_place};
+use bevy_burrow::ground::{ElevationGrid, ElevationTile, ImportError, ImportNote, TileEdges};
 
 /// Cuts a grid into tiles of `cells` x `cells`, with or without shared edges.
 fn cut(whole: &ElevationGrid, cells: u32, is_shared: bool) -> Vec<ElevationTile> {
@@ -119,6 +119,6 @@ fn places_are_read_from_names() {
         ("x_y", None),
         ("island_x99999999999_y1", None),
     ] {
-        assert_eq!(tile_place(name), place, "{name}");
+        assert_eq!(ElevationTile::place_of(name), place, "{name}");
     }
 }

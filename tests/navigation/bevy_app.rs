@@ -12,9 +12,7 @@ use bevy_burrow::navigation::{NavPolygons, NavTilePos, WalkSettings, WalkableTil
 use bevy_burrow::paths::bevy_landmass::{
     PermittedAnimationLinks, PointSampleDistance3d, UsingAnimationLink, prelude::*,
 };
-use bevy_burrow::paths::{
-    Navigation, NavigationArea, NavigationPlugin, NavigationSource, NavigationTiles, archipelago_options,
-};
+use bevy_burrow::paths::{Navigation, NavigationArea, NavigationPlugin, NavigationSource, NavigationTiles};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 
@@ -53,7 +51,7 @@ fn empty_app(same_frame: bool) -> (App, Entity) {
     app.cleanup();
     app.world_mut().resource_mut::<BurrowSettings>().same_frame =
         Duration::from_secs(if same_frame { 60 } else { 0 });
-    let archipelago = app.world_mut().spawn(Archipelago3d::new(archipelago_options(&AGENT, 1.0))).id();
+    let archipelago = app.world_mut().spawn(Archipelago3d::new(AGENT.archipelago_options(1.0))).id();
     (app, archipelago)
 }
 

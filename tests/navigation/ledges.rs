@@ -1,7 +1,7 @@
 //! Links over ledges are exactly those of the definition.
 
 use bevy_burrow::lattice::{Column, LatticeBox};
-use bevy_burrow::navigation::{LedgeLink, NAV_TILE, NavTilePos, WalkSettings, WalkableTile};
+use bevy_burrow::navigation::{LedgeLink, NavTilePos, WalkSettings, WalkableTile};
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::World;
 use fastrand::Rng;
@@ -115,7 +115,10 @@ fn a_platform_is_left_by_jumps_and_climbed_if_it_is_low() {
         Terrain::new(Ground::flat(64, 64, 10.0).expect("valid"), &TerrainSettings::default()).expect("valid");
     // 4 voxels high, over the border of four tiles.
     terrain.apply([Brush::add(
-        Shape::cuboid(Vec3::new(NAV_TILE as f32, 12.0, NAV_TILE as f32), Vec3::new(8.0, 2.0, 8.0)),
+        Shape::cuboid(
+            Vec3::new(NavTilePos::SIZE as f32, 12.0, NavTilePos::SIZE as f32),
+            Vec3::new(8.0, 2.0, 8.0),
+        ),
         MaterialId(1),
     )]);
     let around = |settings: &WalkSettings| -> Vec<LedgeLink> {

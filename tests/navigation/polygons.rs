@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use bevy_burrow::ground::MaterialId;
 use bevy_burrow::lattice::{Column, SNAP};
-use bevy_burrow::navigation::{NAV_TILE, NavPolygons, NavTilePos, WalkSettings, WalkableCell, WalkableTile};
+use bevy_burrow::navigation::{NavPolygons, NavTilePos, WalkSettings, WalkableCell, WalkableTile};
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
@@ -107,7 +107,7 @@ impl Numbered {
                     let (a, b) = (polygon[place], polygon[(place + 1) % polygon.len()]);
                     edges.entry((a.min(b), a.max(b))).or_default().push(first + number);
                     let [p, q] = [a, b].map(|index| polygons.vertices()[index as usize]);
-                    let is_border = |low: i32, high: i32| low == high && low % (NAV_TILE * SNAP) == 0;
+                    let is_border = |low: i32, high: i32| low == high && low % (NavTilePos::SIZE * SNAP) == 0;
                     if is_border(p.x, q.x) || is_border(p.z, q.z) {
                         let origin = pos.origin().at(0) * SNAP;
                         border.push((first + number, pos, p + origin, q + origin));

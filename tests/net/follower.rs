@@ -8,12 +8,12 @@ use std::time::Duration;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::{BrickPos, ChunkPos, RegionPos};
 use bevy_burrow::net::{
-    BulkReader, ClientId, ContentTable, Entries, Entry, Epoch, Hello, Join, KickReason, Lane, PROTOCOL,
-    Refusal, RegionContent, RegionHashes, RuleState, Server, ToClient, ToServer, Welcome, region_hash,
+    BulkReader, ClientId, ContentTable, Entries, Entry, Epoch, Hello, Join, KickReason, Lane, Refusal,
+    RegionContent, RegionHashes, RuleState, Server, ToClient, ToServer, Welcome, region_hash,
     touched_regions,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{EditSettings, Meshing, Patch, SIMULATION};
+use bevy_burrow::terrain::{EditSettings, Meshing, Patch};
 use bevy_burrow::volume::Fields;
 use fastrand::Rng;
 use glam::IVec3;
@@ -125,8 +125,8 @@ impl Follower {
 
     pub fn hello(&self) -> Hello {
         Hello {
-            protocol: PROTOCOL,
-            simulation: SIMULATION,
+            protocol: Server::PROTOCOL,
+            simulation: Terrain::SIMULATION,
             ground: self.ground.hash(),
             chunk_size: 32,
             epoch: self.epoch.map(|epoch| Epoch { number: self.number, ..epoch }),

@@ -7,11 +7,10 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    BulkReader, ClientId, ContentTable, Entries, Epoch, Hello, KickReason, Lane, PROTOCOL, Rate, Reach,
-    Refusal, Server, ServerSettings, ToClient, ToServer, UndoPolicy,
+    BulkReader, ClientId, ContentTable, Entries, Epoch, Hello, KickReason, Lane, Rate, Reach, Refusal,
+    Server, ServerSettings, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::SIMULATION;
 use fastrand::Rng;
 use glam::{IVec3, Vec2, Vec3};
 
@@ -255,9 +254,9 @@ fn decoders_take_any_bytes() {
 
 /// The first message of a client.
 fn hello(ground: &Ground) -> Vec<u8> {
-    let (simulation, ground) = (SIMULATION, ground.hash());
+    let (simulation, ground) = (Terrain::SIMULATION, ground.hash());
     let hello = Hello {
-        protocol: PROTOCOL,
+        protocol: Server::PROTOCOL,
         simulation,
         ground,
         chunk_size: 32,

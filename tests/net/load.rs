@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::net::{ClientId, Hello, Lane, PROTOCOL, Server, ServerSettings, ToServer, UndoPolicy};
+use bevy_burrow::net::{ClientId, Hello, Lane, Server, ServerSettings, ToServer, UndoPolicy};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Meshing, SIMULATION};
+use bevy_burrow::terrain::Meshing;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
@@ -80,8 +80,8 @@ pub fn load(clients: u64, seconds: u64, undo: UndoPolicy, ground: &Arc<Ground>) 
         })
         .collect();
     let hello = Hello {
-        protocol: PROTOCOL,
-        simulation: SIMULATION,
+        protocol: Server::PROTOCOL,
+        simulation: Terrain::SIMULATION,
         ground: ground.hash(),
         chunk_size: 32,
         epoch: None,

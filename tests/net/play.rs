@@ -5,10 +5,9 @@ use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, ContentTable, Hello, PROTOCOL, Server, ServerSettings, ToServer,
+    Client, ClientEvent, ClientId, ContentTable, Hello, Server, ServerSettings, ToServer,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::SIMULATION;
 use glam::{DVec3, IVec3, Vec3};
 
 use crate::follower::terrain;
@@ -32,7 +31,7 @@ pub fn edit(brush: &Brush) -> Edit {
 /// A client of this test, which greets, joins, and can send any messages.
 pub fn let_in(server: &mut Server, id: ClientId, ground: &Ground, now: Duration) {
     let (chunk_size, ground, position) = (32, ground.hash(), IVec3::splat(20));
-    let (protocol, simulation) = (PROTOCOL, SIMULATION);
+    let (protocol, simulation) = (Server::PROTOCOL, Terrain::SIMULATION);
     let hello = Hello { protocol, simulation, ground, chunk_size, epoch: None, position };
     server.connect(id, now);
     server.receive(id, &ToServer::Hello(hello).to_bytes(), now);

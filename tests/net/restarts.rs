@@ -5,10 +5,9 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
-use bevy_burrow::net::{PROTOCOL, Rate, Server, ServerSettings, UndoPolicy};
+use bevy_burrow::net::{Rate, Server, ServerSettings, UndoPolicy};
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{Files, SimulatedDisk, Store, StoreOptions};
-use bevy_burrow::terrain::SIMULATION;
 use fastrand::Rng;
 use glam::{Vec2, Vec3};
 use xxhash_rust::xxh3::Xxh3Default;
@@ -304,9 +303,9 @@ fn state_of(terrain: &Terrain, is_whole: bool, numbers: Option<[u32; 2]>) -> Vec
 #[test]
 fn the_saved_order_of_another_build_is_not_sent() {
     let builds = [
-        (Some([SIMULATION, PROTOCOL]), ["log", "log"]),
-        (Some([SIMULATION - 1, PROTOCOL]), ["regions", "compare"]),
-        (Some([SIMULATION, PROTOCOL - 1]), ["regions", "compare"]),
+        (Some([Terrain::SIMULATION, Server::PROTOCOL]), ["log", "log"]),
+        (Some([Terrain::SIMULATION - 1, Server::PROTOCOL]), ["regions", "compare"]),
+        (Some([Terrain::SIMULATION, Server::PROTOCOL - 1]), ["regions", "compare"]),
         (None, ["regions", "compare"]),
     ];
     // In another build, the digs were elsewhere.
@@ -314,7 +313,7 @@ fn the_saved_order_of_another_build_is_not_sent() {
     let mut digger = other.join(1);
     other.dig(&mut [&mut digger], 20..30);
     for (numbers, expected) in builds {
-        let is_other = numbers != Some([SIMULATION, PROTOCOL]);
+        let is_other = numbers != Some([Terrain::SIMULATION, Server::PROTOCOL]);
         let mut scene = Scene::new();
         let mut a = scene.join(1);
         scene.dig(&mut [&mut a], 0..10);

@@ -13,10 +13,9 @@ use allocation_counter::measure;
 use bevy_burrow::brush::Edit;
 use bevy_burrow::lattice::RegionPos;
 use bevy_burrow::net::{
-    Client, ClientEvent, ClientId, Hello, PROTOCOL, Rate, Server, ServerSettings, ToServer, UndoPolicy,
+    Client, ClientEvent, ClientId, Hello, Rate, Server, ServerSettings, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::SIMULATION;
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
@@ -70,7 +69,7 @@ struct Attackers {
 
 impl Attackers {
     fn greet(&self, server: &mut Server, at: usize, now: Duration) {
-        let (protocol, simulation, position) = (PROTOCOL, SIMULATION, IVec3::splat(20));
+        let (protocol, simulation, position) = (Server::PROTOCOL, Terrain::SIMULATION, IVec3::splat(20));
         let hello =
             Hello { protocol, simulation, ground: self.ground, chunk_size: 32, epoch: None, position };
         server.receive(ClientId(HOSTILE + at as u64), &ToServer::Hello(hello).to_bytes(), now);

@@ -33,7 +33,7 @@ fn with_table(stage: Stage, voxel_size: f32, place: Vec3, stay: f32) -> (Stage, 
         .init_resource::<Crumbled>()
         .add_observer(|_: On<DebrisCrumbled>, mut crumbled: ResMut<Crumbled>| crumbled.0 += 1);
     stage.app.insert_resource(DebrisSettings { stay, ..default() });
-    let loose = LooseGround { crumbs: 8, debris: 9000, ..default() };
+    let loose = LooseSettings { crumbs: 8, debris: 9000, ..default() };
     let mut entity_mut = stage.app.world_mut().entity_mut(entity);
     entity_mut.insert(loose);
     entity_mut.get_mut::<Transform>().expect("terrains have one").translation = place;

@@ -109,7 +109,11 @@ fn ground_debris_and_inventories_are_constant() {
         stay: 1e9,
         ..default()
     });
-    stage.app.world_mut().entity_mut(terrain).insert(LooseGround { largest: 6000, crumbs: 6, debris: 4000 });
+    stage.app.world_mut().entity_mut(terrain).insert(LooseSettings {
+        largest: 6000,
+        crumbs: 6,
+        debris: 4000,
+    });
     stage.frame();
     let (mut fallen, mut returned, mut most) = (0, 0, 0);
     for step in 0..number("BURROW_STEPS", 150) {
@@ -162,7 +166,7 @@ fn beams(count: u64) -> (Stage, Entity) {
     terrain.apply((0..count).flat_map(beam));
     let (mut stage, entity) = Stage::with_ground(terrain);
     stage.app.insert_resource(DebrisSettings { stay: 1e9, ..default() });
-    let loose = LooseGround { crumbs: 8, debris: 9000, ..default() };
+    let loose = LooseSettings { crumbs: 8, debris: 9000, ..default() };
     stage.app.world_mut().entity_mut(entity).insert(loose);
     stage.frame();
     (stage, entity)

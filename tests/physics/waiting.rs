@@ -62,7 +62,7 @@ fn colliders_and_debris_come_while_another_terrain_loads() {
         Shape::cuboid(Vec3::new(8.0, 14.0, 8.0), Vec3::new(1.2, 8.0, 1.2)),
         MaterialId(2),
     )]);
-    let loose = LooseGround { debris: 4096, ..default() };
+    let loose = LooseSettings { debris: 4096, ..default() };
     let world = stage.app.world_mut();
     let terrain = world.spawn((terrain, loose)).id();
     let source = world.spawn((Transform::from_xyz(8.0, 8.0, 8.0), ColliderSource { radius: 8.0 })).id();

@@ -171,7 +171,7 @@ fn a_terrain_that_was_disabled_goes_on_where_it_was() {
         stage.frame();
         stage.app.world_mut().entity_mut(terrain).insert_recursive::<Children>(Disabled);
         // What changes meanwhile is caught up with.
-        stage.app.world_mut().entity_mut(terrain).insert(LooseGround::default());
+        stage.app.world_mut().entity_mut(terrain).insert(LooseSettings::default());
         stage.frames(6);
         stage.app.world_mut().entity_mut(terrain).remove_recursive::<Children, Disabled>();
         stage.settle();

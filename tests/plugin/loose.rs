@@ -21,12 +21,12 @@ fn saw() -> Brush {
 #[test]
 fn a_piece_that_breaks_off_is_reported_with_its_mesh() {
     let mut model = table();
-    model.set_loose(Some(LooseGround { debris: 9000, ..default() }.into()));
+    model.set_loose(Some(LooseSettings { debris: 9000, ..default() }));
     model.apply([saw()]);
     for (is_drawing, stage) in [(true, Stage::drawing()), (false, Stage::server())] {
         let mut stage = stage.recording::<LoosePieceFound>();
         let terrain = stage.show(table());
-        stage.app.world_mut().entity_mut(terrain).insert(LooseGround { debris: 9000, ..default() });
+        stage.app.world_mut().entity_mut(terrain).insert(LooseSettings { debris: 9000, ..default() });
         stage.send(saw());
         stage.settle();
         assert_eq!(stage.hash(terrain), model.world().hash());
@@ -45,7 +45,7 @@ fn a_piece_that_breaks_off_is_reported_with_its_mesh() {
         stage.write(Undo { terrain: None });
         stage.settle();
         assert_eq!(stage.hash(terrain), table().world().hash());
-        stage.app.world_mut().entity_mut(terrain).remove::<LooseGround>();
+        stage.app.world_mut().entity_mut(terrain).remove::<LooseSettings>();
         stage.send(saw());
         stage.settle();
         assert!(stage.recorded::<LoosePieceFound>().is_empty(), "the search is off");
@@ -55,8 +55,8 @@ fn a_piece_that_breaks_off_is_reported_with_its_mesh() {
 
 #[test]
 fn loose_pieces_of_a_games_own_edits_are_found_before_any_brush() {
-    let loose = LooseGround { debris: 9000, ..default() };
-    let spawns: [fn(&mut World, LooseGround) -> Entity; 3] = [
+    let loose = LooseSettings { debris: 9000, ..default() };
+    let spawns: [fn(&mut World, LooseSettings) -> Entity; 3] = [
         |world, loose| world.spawn((table(), loose)).id(),
         |world, loose| world.spawn(table()).insert(loose).id(),
         |world, loose| world.spawn(loose).insert(table()).id(),

@@ -9,9 +9,7 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::navigation::WalkSettings;
 use bevy_burrow::paths::bevy_landmass::prelude::*;
-use bevy_burrow::paths::{
-    Navigation, NavigationArea, NavigationPlugin, NavigationTiles, archipelago_options,
-};
+use bevy_burrow::paths::{Navigation, NavigationArea, NavigationPlugin, NavigationTiles};
 use bevy_burrow::physics::{ColliderSource, PhysicsFigures, TerrainPhysicsPlugin};
 use bevy_burrow::plants::{PlantRemoved, PlantSource, Plants, PlantsPlugin, ShownPlants};
 use bevy_burrow::plugin::Held;
@@ -88,7 +86,7 @@ fn populate(stage: &mut Stage, folder: &Folder) -> Entity {
     let plants = Plants(ScatterRules { seed: 3, species: vec![fern] });
     let agent = WalkSettings { radius: 0.4, height: 1.8, ..default() };
     let world = stage.app.world_mut();
-    let archipelago = world.spawn(Archipelago3d::new(archipelago_options(&agent, 1.0))).id();
+    let archipelago = world.spawn(Archipelago3d::new(agent.archipelago_options(1.0))).id();
     world.spawn((
         Transform::from_xyz(32.0, 8.0, 32.0),
         PlantSource { radius: 100.0 },

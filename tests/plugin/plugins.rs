@@ -15,7 +15,7 @@ fn a_terrain_may_be_there_before_the_plugin() {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin));
     let place = Transform::from_xyz(64.0, 0.0, 0.0);
-    let terrain = app.world_mut().spawn((level(0.5), place, LooseGround::default())).id();
+    let terrain = app.world_mut().spawn((level(0.5), place, LooseSettings::default())).id();
     // Queries in `Startup` find it where it is.
     #[derive(Resource)]
     struct Found(Option<f32>);

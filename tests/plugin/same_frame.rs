@@ -136,7 +136,7 @@ fn ground_that_breaks_off_is_gone_when_its_debris_is_there() {
     let slab = Shape::cuboid(Vec3::new(32.0, 18.0, 32.0), Vec3::new(4.2, 2.2, 4.2));
     ground.apply([Brush::add(pillar, MaterialId(2)), Brush::add(slab, MaterialId(3))]);
     let terrain = stage.show(ground);
-    stage.app.world_mut().entity_mut(terrain).insert(LooseGround { debris: 9000, ..default() });
+    stage.app.world_mut().entity_mut(terrain).insert(LooseSettings { debris: 9000, ..default() });
     let hash = stage.hash(terrain);
     stage.send(Brush::dig(Shape::cuboid(Vec3::new(32.0, 12.0, 32.0), Vec3::new(3.0, 1.2, 3.0))));
     stage.frame();

@@ -5,9 +5,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use bevy::prelude::*;
-use bevy_burrow::format::{Level, pack_level, write_level};
+use bevy_burrow::format::Level;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{StoreError, StoreOptions, load_level, save_level};
+use bevy_burrow::store::{StoreError, StoreOptions};
 
 use crate::saved::{
     Folder, Heard, app, dig, ground, hash, hear, run_until, run_until_applied, run_until_opened,
@@ -196,7 +196,7 @@ fn a_terrain_begins_as_the_level_that_is_loaded() {
     let folder = Folder::new("level");
     let (level, expected) = level();
     std::fs::create_dir_all(&folder.0).expect("a new folder");
-    let packed = pack_level(&write_level(&level).expect("it can be written")).expect("it is small");
+    let packed = Level::pack_files(&level.to_files().expect("it can be written")).expect("it is small");
     std::fs::write(folder.0.join("pit.burrow_level"), packed).expect("a new file");
 
     let mut app = App::new();
@@ -270,7 +270,7 @@ fn rules_that_the_game_has_set_hold_in_a_level_without_any() {
 fn a_folder_of_a_level_changes_only_where_the_level_does() {
     let folder = Folder::new("level-folder");
     let (level, expected) = level();
-    save_level(&folder.0, &level).expect("a new folder");
+    level.save(&folder.0).expect("a new folder");
     let files = || {
         let entries = std::fs::read_dir(&folder.0).expect("a folder").flatten();
         entries
@@ -278,10 +278,10 @@ fn a_folder_of_a_level_changes_only_where_the_level_does() {
             .collect::<Vec<_>>()
     };
     let before = files();
-    save_level(&folder.0, &level).expect("the same again");
+    level.save(&folder.0).expect("the same again");
     assert_eq!(files(), before);
     let ground = std::sync::Arc::new(ground());
-    let loaded = load_level(&folder.0, &ground).expect("it was just written");
+    let loaded = Level::load(&folder.0, &ground).expect("it was just written");
     assert_eq!(loaded.terrain(ground).expect("the same ground").world().hash(), expected);
 }
 

@@ -4,7 +4,6 @@ use std::collections::{HashMap, HashSet};
 
 use bevy::mesh::VertexAttributeValues;
 use bevy::prelude::*;
-use bevy_burrow::plugin::ATTRIBUTE_SKY_LIGHT;
 use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level, random_brushes, steep};
@@ -19,7 +18,7 @@ fn lights(stage: &mut Stage) -> Option<HashMap<IVec3, [u8; 4]>> {
     let mut found = HashMap::new();
     for (handle, origin) in drawn {
         let mesh = meshes.get(&handle).expect("it is shown");
-        let Some(VertexAttributeValues::Unorm8x4(own)) = mesh.attribute(ATTRIBUTE_SKY_LIGHT) else {
+        let Some(VertexAttributeValues::Unorm8x4(own)) = mesh.attribute(Terrain::ATTRIBUTE_SKY_LIGHT) else {
             return None;
         };
         let places = mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(VertexAttributeValues::as_float3);

@@ -1,6 +1,6 @@
 //! Files of prefabs: they come back as they were, and any damage is noticed.
 
-use bevy_burrow::format::{FormatError, read_prefab, write_prefab};
+use bevy_burrow::format::FormatError;
 use bevy_burrow::prelude::*;
 use fastrand::Rng;
 
@@ -23,18 +23,18 @@ fn damage_count() -> usize {
 fn a_prefab_comes_back_from_its_file() {
     for seed in 0..world_count(20) {
         let prefab = prefab(seed);
-        let file = write_prefab(&prefab);
-        let read = read_prefab(&file).expect("its own file");
+        let file = prefab.to_bytes();
+        let read = Prefab::from_bytes(&file).expect("its own file");
         assert_eq!((&read, read.hash()), (&prefab, prefab.hash()));
-        assert_eq!(write_prefab(&read), file, "equal prefabs give equal bytes");
+        assert_eq!(read.to_bytes(), file, "equal prefabs give equal bytes");
     }
 }
 
 #[test]
 fn any_damage_of_a_file_is_refused() {
-    let file = write_prefab(&prefab(3));
+    let file = prefab(3).to_bytes();
     for length in 0..file.len().min(3000) {
-        assert!(read_prefab(&file[..length]).is_err(), "cut off after {length}");
+        assert!(Prefab::from_bytes(&file[..length]).is_err(), "cut off after {length}");
     }
     let mut rng = Rng::with_seed(4);
     for _ in 0..damage_count() {
@@ -48,10 +48,10 @@ fn any_damage_of_a_file_is_refused() {
                 _ => bytes.insert(at, rng.u8(..)),
             }
         }
-        assert!(bytes == file || read_prefab(&bytes).is_err());
+        assert!(bytes == file || Prefab::from_bytes(&bytes).is_err());
     }
-    assert_eq!(read_prefab(b""), Err(FormatError::Magic));
-    assert_eq!(read_prefab(b"no prefab at all"), Err(FormatError::Magic));
+    assert_eq!(Prefab::from_bytes(b""), Err(FormatError::Magic));
+    assert_eq!(Prefab::from_bytes(b"no prefab at all"), Err(FormatError::Magic));
 }
 
 #[test]
@@ -66,7 +66,7 @@ fn serialised_bytes_of_any_content_are_read_or_refused_without_a_panic() {
         }
         // Whatever could be read is a prefab that can be written.
         if let Ok(read) = serde_json::from_slice::<Prefab>(&bytes) {
-            assert_eq!(read_prefab(&write_prefab(&read)), Ok(read));
+            assert_eq!(Prefab::from_bytes(&read.to_bytes()), Ok(read));
         }
     }
 }

@@ -10,7 +10,7 @@ use bevy_burrow::format::WorldId;
 use bevy_burrow::ground::{ElevationGrid, ElevationScale, ImportOptions, MaterialMap, Repair};
 use bevy_burrow::lattice::{Column, LatticeBox};
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{from_bytes, to_bytes};
+use bevy_burrow::store::WorldFile;
 use bevy_burrow::terrain::{Meshing, World};
 use bevy_burrow::volume::MaterialCounts;
 use fastrand::Rng;
@@ -264,8 +264,8 @@ impl Twins {
         let settings = TerrainSettings { chunk_size: 13, ..TerrainSettings::default() };
         let restored = Terrain::restore(Arc::clone(&ground), &settings, self.together.parts());
         let restored = restored.unwrap_or_else(|why| panic!("{what}: {why}"));
-        let bytes = to_bytes(&self.together, WorldId(1), &BTreeMap::new()).expect("it is small");
-        let read = from_bytes(&bytes, ground).expect("its own bytes").terrain;
+        let bytes = WorldFile::to_bytes(&self.together, WorldId(1), &BTreeMap::new()).expect("it is small");
+        let read = WorldFile::from_bytes(&bytes, ground).expect("its own bytes").terrain;
         for own in [&restored, &read] {
             assert_eq!(own.world().hash(), world.hash(), "{what}");
             check_fields(own.world(), what);

@@ -9,7 +9,7 @@ use bevy_burrow::format::WorldId;
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::net::{Client, ClientEvent, ClientId, Lane, Server, ServerSettings};
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions, from_bytes, to_bytes};
+use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions, WorldFile};
 use fastrand::Rng;
 use glam::{IVec3, Vec3};
 
@@ -34,8 +34,8 @@ fn a_world_with_a_paste_is_the_same_after_it_was_saved() {
         assert_eq!(opened.terrain.world().hash(), world.world().hash());
         assert!(opened.warnings.is_empty(), "{:?}", opened.warnings);
 
-        let bytes = to_bytes(&world, WorldId(1), &BTreeMap::new()).expect("it is small");
-        let read = from_bytes(&bytes, ground).expect("its own bytes").terrain;
+        let bytes = WorldFile::to_bytes(&world, WorldId(1), &BTreeMap::new()).expect("it is small");
+        let read = WorldFile::from_bytes(&bytes, ground).expect("its own bytes").terrain;
         assert_eq!(read.world().hash(), world.world().hash());
     }
 }

@@ -4,9 +4,7 @@ use std::time::{Duration, Instant};
 
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
-use bevy_burrow::plants::{
-    PlantRemoved, PlantReturned, PlantSource, Plants, PlantsPlugin, ShownPlants, removal_of,
-};
+use bevy_burrow::plants::{PlantRemoved, PlantReturned, PlantSource, Plants, PlantsPlugin, ShownPlants};
 use bevy_burrow::prelude::*;
 use bevy_burrow::scatter::{Clearance, Plant, ScatterRules, Species, ViewDistances};
 
@@ -150,7 +148,7 @@ fn a_game_removes_a_plant_with_a_brush() {
     let plants = standing(&app, terrain);
     let tree = *plants.iter().find(|plant| plant.id.species == 0).expect("a tree");
     let at = *app.world().get::<GlobalTransform>(terrain).expect("placed");
-    app.world_mut().write_message(removal_of(&tree, &at)).expect("the plugin added it");
+    app.world_mut().write_message(tree.removal_in_world(&at)).expect("the plugin added it");
     wait(&mut app, |world| !world.resource::<Log>().removed.is_empty());
     let removed = app.world().resource::<Log>().removed.iter().find(|removed| removed.plant == tree).cloned();
     let removed = removed.expect("the tree");

@@ -5,9 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{
-    Files, Folder, Store, StoreError, StoreWarning, check, inspect, read_world, replay,
-};
+use bevy_burrow::store::{Files, Folder, Store, StoreError, StoreWarning, read_world, replay};
 
 use crate::opening::Place;
 use crate::play::{State, act, ground, options, save, state, terrain};
@@ -57,7 +55,7 @@ fn a_world_stays_locked_though_its_lock_is_removed() {
     fs::remove_file(place.0.join("lock")).expect("it is there");
     let locked = opened(&place.0, &ground).expect_err("it is open");
     assert!(matches!(locked, StoreError::Locked(_)), "{locked}");
-    assert!(matches!(inspect(&place.0), Err(StoreError::Locked(_))));
+    assert!(matches!(Store::inspect(&place.0), Err(StoreError::Locked(_))));
     drop(store);
     assert_eq!(opened(&place.0, &ground).expect("it is closed").0, state(&world));
 }
@@ -152,8 +150,8 @@ fn a_world_that_may_only_be_read_is_read() {
         };
         allow(&place.0, false);
         let before = files();
-        let info = inspect(&place.0);
-        let checked = check(&place.0, Arc::clone(&ground), None);
+        let info = Store::inspect(&place.0);
+        let checked = Store::check(&place.0, Arc::clone(&ground), None);
         let read = read_world(&place.0, Arc::clone(&ground), None);
         let replayed = replay(&place.0, Arc::clone(&ground), None);
         // As root the lock can be made.
@@ -215,7 +213,7 @@ fn a_journal_that_is_removed_after_a_crash_is_missed() {
         |warnings: &[StoreWarning]| warnings.iter().any(|own| matches!(own, StoreWarning::LogMissing { .. }));
     let (place, _) = killed("journal", &ground);
     fs::remove_dir_all(place.0.join("journal")).expect("a folder");
-    let checked = check(&place.0, Arc::clone(&ground), None).expect("it can be read");
+    let checked = Store::check(&place.0, Arc::clone(&ground), None).expect("it can be read");
     assert!(checked.warnings.iter().any(|own| own.contains("the log is missing")), "{:?}", checked.warnings);
     let (now, warnings) = opened(&place.0, &ground).expect("the database is whole");
     assert!(is_told(&warnings) && now.hash == terrain(&ground).world().hash(), "{warnings:?}");

@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use bevy_burrow::format::WorldId;
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{
-    SimulatedDisk, Store, StoreOptions, StoreWarning, from_bytes, inspect_in, to_bytes,
-};
+use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions, StoreWarning, WorldFile, inspect_in};
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{MeshKey, Meshing, PartsError};
 use fastrand::Rng;
@@ -29,8 +27,8 @@ fn drawn(terrain: &Terrain) -> BTreeMap<MeshKey, SurfaceMesh> {
 
 /// The world, written and read again over a ground.
 fn read_over(ground: &Arc<Ground>, terrain: &Terrain) -> Terrain {
-    let bytes = to_bytes(terrain, WorldId(1), &BTreeMap::new()).expect("it is small");
-    let mut read = from_bytes(&bytes, Arc::clone(ground)).expect("its own bytes").terrain;
+    let bytes = WorldFile::to_bytes(terrain, WorldId(1), &BTreeMap::new()).expect("it is small");
+    let mut read = WorldFile::from_bytes(&bytes, Arc::clone(ground)).expect("its own bytes").terrain;
     read.set_meshing(terrain.meshing());
     read
 }

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use bevy_burrow::format::Level;
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{
-    BaseChanged, BaseLevel, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning, check_in,
-    from_bytes, inspect_in, to_bytes,
+    BaseChanged, BaseLevel, Files, SimulatedDisk, Store, StoreError, StoreOptions, StoreWarning, WorldFile,
+    check_in, inspect_in,
 };
 use bevy_burrow::terrain::{Meshing, Patch};
 use fastrand::Rng;
@@ -89,8 +89,9 @@ fn a_world_on_a_level_comes_back_whatever_happens() {
         assert!(opened.warnings.is_empty() && opened.is_log_whole && opened.replayed == 0);
         assert_eq!(state(&opened.terrain), state(&world));
         // A file to share needs no level.
-        let bytes = to_bytes(&opened.terrain, Default::default(), &BTreeMap::new()).expect("it is small");
-        let shared = from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
+        let bytes =
+            WorldFile::to_bytes(&opened.terrain, Default::default(), &BTreeMap::new()).expect("it is small");
+        let shared = WorldFile::from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
         assert_eq!(state(&shared.terrain), state(&world));
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use bevy_burrow::prelude::*;
-use bevy_burrow::store::{SimulatedDisk, Store, from_bytes, to_bytes};
+use bevy_burrow::store::{SimulatedDisk, Store, WorldFile};
 use bevy_burrow::terrain::{Meshing, WorldParts};
 use fastrand::Rng;
 
@@ -109,10 +109,10 @@ fn play(seed: u64, operations: u64) -> [u64; 5] {
             }
             39 => {
                 // The world is exported to bytes and imported into another folder.
-                let bytes =
-                    to_bytes(&saved, open_store.world_id(), open_store.game_data()).expect("it is small");
+                let bytes = WorldFile::to_bytes(&saved, open_store.world_id(), open_store.game_data())
+                    .expect("it is small");
                 drop(store.take());
-                let imported = from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
+                let imported = WorldFile::from_bytes(&bytes, Arc::clone(&ground)).expect("its own bytes");
                 saved = imported.terrain;
                 assert_eq!(state(&saved), state(&model.terrain), "seed {seed}");
                 saved.set_meshing(Meshing::Never);

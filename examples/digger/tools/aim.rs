@@ -4,7 +4,6 @@
 mod gizmos;
 
 use bevy::prelude::*;
-use bevy_burrow::debug::draw_shape;
 use bevy_burrow::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -136,7 +135,7 @@ fn draw_preview(preview: Res<Preview>, mut gizmos: Gizmos) {
             let rotation = Quat::from_rotation_arc(Vec3::Z, normal.normalize_or(Vec3::Y));
             gizmos.circle(Isometry3d::new(point + normal * 0.05, rotation), radius, color).resolution(48);
         }
-        Tool::Builder => draw_shape(&mut gizmos, &input.shape_at(radius), color),
+        Tool::Builder => input.shape_at(radius).draw(&mut gizmos, color),
         Tool::Bomb | Tool::Lamp | Tool::Ball => {}
     }
 }

@@ -21,7 +21,7 @@ impl Plugin for DebrisEffectsPlugin {
 }
 
 fn enable_loose_ground(ready: On<TerrainReady>, mut commands: Commands) {
-    commands.entity(ready.entity).try_insert(LooseGround { crumbs: CRUMBS, debris: DEBRIS, ..default() });
+    commands.entity(ready.entity).try_insert(LooseSettings { crumbs: CRUMBS, debris: DEBRIS, ..default() });
 }
 
 fn crumble(

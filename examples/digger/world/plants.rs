@@ -4,8 +4,7 @@ use avian3d::prelude::*;
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use bevy_burrow::plants::{
-    PlantDrawingPlugin, PlantLook, PlantLooks, PlantRemoved, PlantReturned, Plants, PlantsPlugin,
-    ShownPlants, removal_of,
+    PlantDrawingPlugin, PlantLook, PlantLooks, PlantRemoved, PlantReturned, Plants, PlantsPlugin, ShownPlants,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::scatter::{Clearance, Clusters, PlantId, ScatterRules, Species, Stem, ViewDistances};
@@ -139,7 +138,7 @@ fn fell(
         let world = terrain.world();
         let most = f64::from(reach.min(REACH) / terrain.voxel_size());
         if let Some(hit) = scatter.raycast(world, origin, direction, most, |_| true) {
-            brushes.write(TargetedBrush { terrain: entity, brush: removal_of(&hit.plant, place) });
+            brushes.write(TargetedBrush { terrain: entity, brush: hit.plant.removal_in_world(place) });
             misses.end();
         }
     }

@@ -1,7 +1,7 @@
 //! Images, grids and prefabs that edits refer to by name: an encoded edit holds either the content or its name.
 
 use super::round_trips;
-use crate::brush::Edit;
+use crate::brush::{Edit, Prefab};
 use crate::format::FormatError;
 use crate::format::bytes::Reader;
 use crate::format::contents::{ContentTable, Resolved, named};
@@ -96,7 +96,6 @@ fn content_is_within_the_limits_of_edits_wherever_it_comes_from() {
 #[test]
 fn a_prefab_is_packed_once() {
     use crate::format::prefab::packed_prefab;
-    use crate::format::{read_prefab, write_prefab};
     let edits = edits();
     let prefab = edits[1].prefab().unwrap();
     let unpacked = prefab.bytes();
@@ -104,7 +103,7 @@ fn a_prefab_is_packed_once() {
     assert_eq!(prefab.bytes(), unpacked + packed.len());
     // Wherever it is sent, listed or saved.
     assert!(ContentTable::default().add_prefab(std::sync::Arc::clone(prefab)).is_some());
-    assert_eq!(write_prefab(prefab), packed[..]);
+    assert_eq!(prefab.to_bytes(), packed[..]);
     assert!(std::sync::Arc::ptr_eq(packed_prefab(prefab), &packed));
-    assert_eq!(read_prefab(&packed).as_ref(), Ok(&**prefab));
+    assert_eq!(Prefab::from_bytes(&packed).as_ref(), Ok(&**prefab));
 }

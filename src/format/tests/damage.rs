@@ -5,7 +5,7 @@ use fastrand::Rng;
 use super::{compare, count, worlds};
 use crate::format::FormatError;
 use crate::format::frame::{self, Kind, WorldId, seal};
-use crate::format::level::{Level, pack_level, unpack_level, write_level};
+use crate::format::level::Level;
 use crate::format::portable::{read_portable, write_portable};
 
 /// Changes bytes somehow; they may stay the same.
@@ -47,8 +47,8 @@ fn damaged_files_are_told() {
     let mut terrain = worlds::eventful(&ground, 12, 1);
     let saved = worlds::portable(&mut terrain, &ground);
     let file = write_portable(&saved).unwrap();
-    let files = write_level(&Level::new(terrain.parts(), 1.0, Default::default(), &ground)).unwrap();
-    let packed = pack_level(&files).unwrap();
+    let files = Level::new(terrain.parts(), 1.0, Default::default(), &ground).to_files().unwrap();
+    let packed = Level::pack_files(&files).unwrap();
     let (key, world) = (*b"a key", WorldId(7));
     let sealed = seal(Kind::Region, world, &key, 9, 11, &packed);
     let mut rng = Rng::with_seed(count("BURROW_SEED", 1));
@@ -64,7 +64,7 @@ fn damaged_files_are_told() {
             Ok(read) => assert!(compare::portables(&read, &saved)),
             Err(_) => told += 1,
         }
-        match unpack_level(&damaged(&packed)) {
+        match Level::unpack_files(&damaged(&packed)) {
             Ok(read) => assert_eq!(read, files),
             Err(_) => told += 1,
         }

@@ -7,11 +7,11 @@ use glam::{IVec3, Vec3};
 
 use super::{compare, worlds};
 use crate::brush::{Brush, Shape};
-use crate::format::level::{LEVEL_JSON, Level, LevelFiles, read_level, write_level};
+use crate::format::level::{LEVEL_JSON, Level, LevelFiles};
 use crate::format::portable::{PortableWorld, read_portable, write_portable};
 use crate::ground::{Ground, MaterialId};
 use crate::lattice::LatticeBox;
-use crate::terrain::{LooseSettings, SIMULATION, Terrain, TerrainSettings};
+use crate::terrain::{LooseSettings, Terrain, TerrainSettings};
 use crate::volume::DiggingRules;
 
 fn folder() -> PathBuf {
@@ -48,7 +48,7 @@ fn world() -> Terrain {
     terrain
 }
 
-/// The [`SIMULATION`] of the stored files; those of later ones have the same form.
+/// The [`Terrain::SIMULATION`] of the stored files; those of later ones have the same form.
 const STORED_SIMULATION: u32 = 1;
 
 fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
@@ -58,12 +58,12 @@ fn written() -> (PortableWorld, Vec<u8>, LevelFiles) {
     let mut portable = worlds::portable(&mut terrain, &ground);
     portable.metadata.simulation = STORED_SIMULATION;
     let file = write_portable(&portable).unwrap();
-    let mut files = write_level(&level).expect("a valid level");
+    let mut files = level.to_files().expect("a valid level");
     let json = files.get_mut(LEVEL_JSON).expect("each level has one");
     let line = |simulation: u32| format!("\"simulation\": {simulation},");
     let text = String::from_utf8(std::mem::take(json)).expect("JSON is text");
-    assert!(text.contains(&line(SIMULATION)));
-    *json = text.replacen(&line(SIMULATION), &line(STORED_SIMULATION), 1).into_bytes();
+    assert!(text.contains(&line(Terrain::SIMULATION)));
+    *json = text.replacen(&line(Terrain::SIMULATION), &line(STORED_SIMULATION), 1).into_bytes();
     (portable, file, files)
 }
 
@@ -103,7 +103,7 @@ fn levels_of_schema_1_can_be_read() {
         files.insert(name, bytes);
     }
     assert_eq!(files, written, "what is written today differs from schema 1: it needs a new number");
-    read_level(&files, &ground).unwrap();
+    Level::from_files(&files, &ground).unwrap();
 }
 
 /// A frame of a journal that names content, and the file of each content: schema 2.

@@ -11,7 +11,7 @@ use crate::format::bytes::Reader;
 use crate::format::contents::ContentTable;
 use crate::format::edits::{EditSequence, put_edit};
 use crate::format::frame::{self, Kind, WorldId};
-use crate::format::level::{Level, read_level, unpack_level, write_level};
+use crate::format::level::Level;
 use crate::format::limits::Limits;
 use crate::format::portable::{read_portable, write_portable};
 use crate::format::{Batch, Metadata, container, decode_region, encode_region};
@@ -172,16 +172,16 @@ fn portable_files() {
 fn levels() {
     let ground = worlds::hills(64);
     let terrain = worlds::eventful(&ground, 5, 4);
-    let files = write_level(&Level::new(terrain.parts(), 1.0, Default::default(), &ground)).unwrap();
-    let packed = crate::format::level::pack_level(&files).unwrap();
-    fuzz("packed level", &[packed], 800, |bytes| unpack_level(bytes).is_ok());
+    let files = Level::new(terrain.parts(), 1.0, Default::default(), &ground).to_files().unwrap();
+    let packed = Level::pack_files(&files).unwrap();
+    fuzz("packed level", &[packed], 800, |bytes| Level::unpack_files(bytes).is_ok());
     for (name, file) in &files {
         fuzz(name, std::slice::from_ref(file), 800, |bytes| {
             let mut files = files.clone();
             files.insert(name.clone(), bytes.to_vec());
-            let Ok(level) = read_level(&files, &ground) else { return false };
-            let Ok(written) = write_level(&level) else { return true };
-            let again = read_level(&written, &ground);
+            let Ok(level) = Level::from_files(&files, &ground) else { return false };
+            let Ok(written) = level.to_files() else { return true };
+            let again = Level::from_files(&written, &ground);
             again.is_ok_and(|again| compare::regions(&again.regions, &level.regions))
         });
     }

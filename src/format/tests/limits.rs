@@ -4,7 +4,7 @@ use fastrand::Rng;
 
 use super::{count, worlds};
 use crate::format::FormatError;
-use crate::format::level::{self, Level, write_level};
+use crate::format::level::{self, Level};
 use crate::format::limits::Limits;
 use crate::format::portable::{self, write_portable};
 
@@ -41,8 +41,8 @@ fn what_is_written_within_limits_is_what_can_be_read_within_them() {
         let game = [("inventory".to_owned(), vec![7; rng.usize(0..4000)])].into();
         let level = Level::new(terrain.parts(), 1.0, game, &ground);
         let world = worlds::portable(&mut terrain, &ground);
-        let files = write_level(&level).unwrap();
-        let (file, packed) = (write_portable(&world).unwrap(), level::pack_level(&files).unwrap());
+        let files = level.to_files().unwrap();
+        let (file, packed) = (write_portable(&world).unwrap(), Level::pack_files(&files).unwrap());
         let mut sizes: Vec<usize> = world.regions.values().map(|region| region.encode().len()).collect();
         sizes.extend(world.journal.iter().map(|batch| batch.encode().len()));
         sizes.extend(files.values().map(Vec::len));

@@ -9,9 +9,7 @@ use crate::brush::{Brush, Edit, GridShape, Paste, Roughness, Shape, ShapeGrid, S
 use crate::format::bytes::Reader;
 use crate::format::contents::ContentTable;
 use crate::format::edits::{EditSequence, put_edit};
-use crate::format::level::{
-    Level, pack_level, read_level, region_name, region_of_name, unpack_level, write_level,
-};
+use crate::format::level::{Level, region_name, region_of_name};
 use crate::format::portable::{read_portable, read_portable_head, write_portable};
 use crate::format::{Batch, Metadata, decode_region, encode_region};
 use crate::ground::{GreyImage, MaterialId};
@@ -62,18 +60,18 @@ fn levels_come_back_and_files_change_only_where_the_ground_did() {
     let of = |terrain: &Terrain| {
         Level::new(terrain.parts(), 0.5, std::collections::BTreeMap::clone(&game), &ground)
     };
-    let (level, files) = (of(&terrain), write_level(&of(&terrain)).unwrap());
-    let packed = pack_level(&files).unwrap();
-    assert_eq!(unpack_level(&packed).unwrap(), files);
-    let read = read_level(&files, &ground).unwrap();
+    let (level, files) = (of(&terrain), of(&terrain).to_files().unwrap());
+    let packed = Level::pack_files(&files).unwrap();
+    assert_eq!(Level::unpack_files(&packed).unwrap(), files);
+    let read = Level::from_files(&files, &ground).unwrap();
     assert!(compare::regions(&read.regions, &level.regions));
     assert!(compare::parts(&read.parts(), &level.parts()));
     assert_eq!((read.settings, read.ground, &read.game), (level.settings, level.ground, &level.game));
-    assert_eq!(write_level(&read).unwrap(), files);
+    assert_eq!(read.to_files().unwrap(), files);
 
     let at = Vec3::new(150.0, 40.0, 150.0);
     terrain.apply([Brush::dig(Shape::sphere(at, 2.0))]);
-    let changed = write_level(&of(&terrain)).unwrap();
+    let changed = of(&terrain).to_files().unwrap();
     let own = region_name(RegionPos::of(crate::lattice::BrickPos::of(at.as_ivec3())));
     for (name, bytes) in &changed {
         let may_change = *name == own || name == "level.json";
@@ -87,17 +85,17 @@ fn a_level_without_one_of_its_files_is_none() {
     let ground = worlds::hills(128);
     let terrain = worlds::eventful(&ground, 30, 2);
     let level = Level::new(terrain.parts(), 1.0, Default::default(), &ground);
-    let files = write_level(&level).unwrap();
+    let files = level.to_files().unwrap();
     assert!(files.len() > 3);
     for name in files.keys() {
         let mut less = files.clone();
         less.remove(name);
-        let error = read_level(&less, &ground).unwrap_err().to_string();
+        let error = Level::from_files(&less, &ground).unwrap_err().to_string();
         assert!(error.contains(name) && error.contains("missing"), "{error}");
     }
     let mut more = files.clone();
     more.insert("r.9.9.9.region".into(), Vec::new());
-    assert!(read_level(&more, &ground).unwrap_err().to_string().contains("r.9.9.9.region"));
+    assert!(Level::from_files(&more, &ground).unwrap_err().to_string().contains("r.9.9.9.region"));
     for name in
         ["r.1.2.region", "r.1.2.3.4.region", "r.01.2.3.region", "r.+1.2.3.region", "../r.1.2.3.region"]
     {

@@ -9,7 +9,7 @@ use crate::format::frame::WorldId;
 use crate::format::portable::PortableWorld;
 use crate::format::{Batch, Metadata};
 use crate::ground::{Ground, MaterialId};
-use crate::terrain::{CommitRecord, LooseSettings, Meshing, SIMULATION, Terrain, TerrainSettings};
+use crate::terrain::{CommitRecord, LooseSettings, Meshing, Terrain, TerrainSettings};
 use crate::volume::DiggingRules;
 
 /// Hills of a gentle kind.
@@ -140,7 +140,7 @@ pub fn portable(terrain: &mut Terrain, ground: &Ground) -> PortableWorld {
     let metadata = Metadata {
         hash: world.hash(),
         ground: ground.hash(),
-        simulation: SIMULATION,
+        simulation: Terrain::SIMULATION,
         game: vec![("time".into(), vec![1, 2, 3])],
         ..Metadata::default()
     };

@@ -19,6 +19,47 @@ pub struct ElevationTile {
     pub grid: ElevationGrid,
 }
 
+impl ElevationTile {
+    /// The place of a tile as its file's name says it, as column and row; `None` if it does not, or says several.
+    ///
+    /// | name | column and row |
+    /// | --- | --- |
+    /// | `island_x3_y5.png`, `island_y5_x3.r16`, `island_1025x1025_x3_y5.png` | 3, 5 |
+    /// | `island_3_5.png`, `3-5.tif` | 3, 5 |
+    /// | `island_x-1_y0.png`, `island_-1_0.png` | -1, 0 |
+    /// | `N46E007.hgt` | 7, -46: rows go south |
+    ///
+    /// A minus is a sign at the beginning, and after another separator or a letter; otherwise it separates.
+    pub fn place_of(name: &str) -> Option<(i32, i32)> {
+        let stem = name.rsplit(['/', '\\']).next()?;
+        let stem = stem.split_once('.').map_or(stem, |(stem, _)| stem).to_ascii_lowercase();
+        let numbers = lettered_numbers(&stem);
+        // Columns and rows that follow each other in the name.
+        let pairs = |columns: [char; 2], rows: [char; 2]| -> Vec<[(char, i32); 2]> {
+            let own: Vec<_> = numbers
+                .iter()
+                .filter(|(letter, _)| columns.contains(letter) || rows.contains(letter))
+                .collect();
+            let sorted =
+                |a: (char, i32), b: (char, i32)| if columns.contains(&a.0) { [a, b] } else { [b, a] };
+            let pairs = own.windows(2).map(|pair| sorted(*pair[0], *pair[1]));
+            pairs.filter(|[a, b]| columns.contains(&a.0) && rows.contains(&b.0)).collect()
+        };
+        let places = pairs(['x'; 2], ['y'; 2]);
+        if let Some(first @ [(_, column), (_, row)]) = places.first() {
+            return places.iter().all(|place| place == first).then_some((*column, *row));
+        }
+        if stem.starts_with(['n', 's'])
+            && let Some(&[(side, east), (half, north)]) = pairs(['e', 'w'], ['n', 's']).first()
+        {
+            return Some((if side == 'w' { -east } else { east }, if half == 'n' { -north } else { north }));
+        }
+        let (row, rest) = last_number(&stem)?;
+        let (column, _) = last_number(rest.strip_suffix(SEPARATORS)?)?;
+        Some((column, row))
+    }
+}
+
 /// How tiles meet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -166,42 +207,6 @@ impl Meeting {
         }
         self.equal >= self.different
     }
-}
-
-/// The place of a tile as its file's name says it, as column and row; `None` if it does not, or says several.
-///
-/// | name | column and row |
-/// | --- | --- |
-/// | `island_x3_y5.png`, `island_y5_x3.r16`, `island_1025x1025_x3_y5.png` | 3, 5 |
-/// | `island_3_5.png`, `3-5.tif` | 3, 5 |
-/// | `island_x-1_y0.png`, `island_-1_0.png` | -1, 0 |
-/// | `N46E007.hgt` | 7, -46: rows go south |
-///
-/// A minus is a sign at the beginning, and after another separator or a letter; otherwise it separates.
-pub fn tile_place(name: &str) -> Option<(i32, i32)> {
-    let stem = name.rsplit(['/', '\\']).next()?;
-    let stem = stem.split_once('.').map_or(stem, |(stem, _)| stem).to_ascii_lowercase();
-    let numbers = lettered_numbers(&stem);
-    // Columns and rows that follow each other in the name.
-    let pairs = |columns: [char; 2], rows: [char; 2]| -> Vec<[(char, i32); 2]> {
-        let own: Vec<_> =
-            numbers.iter().filter(|(letter, _)| columns.contains(letter) || rows.contains(letter)).collect();
-        let sorted = |a: (char, i32), b: (char, i32)| if columns.contains(&a.0) { [a, b] } else { [b, a] };
-        let pairs = own.windows(2).map(|pair| sorted(*pair[0], *pair[1]));
-        pairs.filter(|[a, b]| columns.contains(&a.0) && rows.contains(&b.0)).collect()
-    };
-    let places = pairs(['x'; 2], ['y'; 2]);
-    if let Some(first @ [(_, column), (_, row)]) = places.first() {
-        return places.iter().all(|place| place == first).then_some((*column, *row));
-    }
-    if stem.starts_with(['n', 's'])
-        && let Some(&[(side, east), (half, north)]) = pairs(['e', 'w'], ['n', 's']).first()
-    {
-        return Some((if side == 'w' { -east } else { east }, if half == 'n' { -north } else { north }));
-    }
-    let (row, rest) = last_number(&stem)?;
-    let (column, _) = last_number(rest.strip_suffix(SEPARATORS)?)?;
-    Some((column, row))
 }
 
 /// What separates the numbers of a name.

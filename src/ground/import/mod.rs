@@ -58,7 +58,7 @@ mod write;
 pub use super::material_map::MaterialMap;
 pub use error::ImportError;
 pub use grid::ElevationGrid;
-pub use join::{ElevationTile, TileEdges, tile_place};
+pub use join::{ElevationTile, TileEdges};
 pub use kind::{HeightFormat, SampleKind};
 #[doc(hidden)]
 pub use materials::MAX_LAYERS;

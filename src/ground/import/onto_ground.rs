@@ -111,7 +111,7 @@ impl ElevationGrid {
     /// # Errors
     /// - [`GroundError::ImageTooSmall`] for a grid of less than 2 x 2 samples.
     /// - [`GroundError::Parameter`] for a parameter out of its range.
-    /// - [`GroundError::Size`] if the world would be larger than [`MAX_SIZE`](crate::ground::MAX_SIZE).
+    /// - [`GroundError::Size`] if the world would be larger than [`Ground::MAX_SIZE`].
     /// - [`GroundError::Height`] for the first void, or height beyond the lattice's limit.
     /// - [`GroundError::Memory`] if the machine has too little.
     pub fn into_ground(self, scale: &ElevationScale) -> Result<Ground, GroundError> {

@@ -35,7 +35,7 @@ use crate::brush::Edit;
 use crate::format::WorldId;
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
-use crate::terrain::{Order, Patch, Receipt, Rejection, SIMULATION, TerrainError, TerrainSettings, World};
+use crate::terrain::{Order, Patch, Receipt, Rejection, Terrain, TerrainError, TerrainSettings, World};
 pub use events::{ClientEvent, ClientFigures};
 use images::Images;
 use join::Stage;
@@ -166,8 +166,8 @@ impl Client {
     }
 
     /// Starts with a world that the game already has, such as a level that it ships, instead of the pristine one: its
-    /// [parts](crate::terrain::Terrain::parts). Once it joins, only regions that differ from the server's are sent.
-    /// Call it before the first [`connect`](Self::connect).
+    /// parts. Once it joins, only regions that differ from the server's are sent. Call it before the first
+    /// [`connect`](Self::connect).
     ///
     /// # Errors
     /// When the parts do not fit the ground or the chunk size.
@@ -226,7 +226,7 @@ impl Client {
         self.greeted = self.now;
         let hello = Hello {
             protocol: PROTOCOL,
-            simulation: SIMULATION,
+            simulation: Terrain::SIMULATION,
             ground: self.replica.world().ground().hash(),
             chunk_size: self.chunk_size,
             // A part of a world has no number: the server determines what is missing.

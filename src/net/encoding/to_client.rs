@@ -9,12 +9,13 @@ use super::entries::{ENTRIES, put_entry, read_entry};
 use super::joins::{put_welcome, read_welcome};
 use super::packed::{PACKED, unpack};
 use super::parts::{at_index, index_of, put_hashes, read_hashes, small, within};
+use crate::brush::Prefab;
 use crate::format::bytes::{Reader, put_number};
 use crate::format::contents::{put_image, read_image};
 use crate::format::edits::EditSequence;
 use crate::format::fields::{point, put_point};
 use crate::format::prefab::packed_prefab;
-use crate::format::{FormatError, decode_region, encode_region, read_prefab};
+use crate::format::{FormatError, decode_region, encode_region};
 use crate::ground::Ground;
 use crate::lattice::RegionPos;
 
@@ -187,7 +188,7 @@ impl ToClient {
             STREAM => Self::Stream { stream: reader.number()? },
             GREET => Self::Greet,
             IMAGE => Self::Image(read_image(&mut reader)?),
-            PREFAB => Self::Prefab(Arc::new(read_prefab(std::mem::take(&mut reader.0))?)),
+            PREFAB => Self::Prefab(Arc::new(Prefab::from_bytes(std::mem::take(&mut reader.0))?)),
             _ => return Err(FormatError::Invalid("tag of a message")),
         };
         reader.end()?;

@@ -12,7 +12,9 @@ use super::sender::Snapshot;
 use super::session::{Fetch, Stage};
 use super::{Server, ServerEvent};
 use crate::lattice::RegionPos;
-use crate::net::message::{ClientId, Epoch, Hello, Join, KickReason, Lane, RegionHashes, ToClient, Welcome};
+use crate::net::message::{
+    ClientId, Epoch, Hello, Join, KickReason, Lane, PROTOCOL, RegionHashes, ToClient, Welcome,
+};
 use crate::net::regions::{region_hash, regions_of};
 
 /// The shortest interval between answers to fetches: each one keeps a state of the world, whose index is copied once it
@@ -35,8 +37,8 @@ impl Server {
     pub(super) fn greet(&mut self, client: ClientId, stream: Option<u64>, hello: Hello) {
         let world = self.terrain.world();
         let checks = [
-            (hello.protocol == crate::net::PROTOCOL, KickReason::Protocol),
-            (hello.simulation == crate::terrain::SIMULATION, KickReason::Simulation),
+            (hello.protocol == PROTOCOL, KickReason::Protocol),
+            (hello.simulation == crate::terrain::Terrain::SIMULATION, KickReason::Simulation),
             (hello.ground == world.ground().hash(), KickReason::Ground),
             (i64::from(hello.chunk_size) == i64::from(world.grid().size()), KickReason::ChunkSize),
         ];

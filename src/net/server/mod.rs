@@ -48,7 +48,7 @@ use glam::IVec3;
 
 use super::ContentTable;
 use super::encoding::{EntryWriter, entry_bytes};
-use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, ToClient};
+use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, PROTOCOL, ToClient};
 use super::never_shown;
 use super::regions::RegionSums;
 use crate::brush::Edit;
@@ -191,6 +191,9 @@ impl fmt::Debug for Server {
 }
 
 impl Server {
+    /// The version of the protocol. It changes whenever the encoding of messages does.
+    pub const PROTOCOL: u32 = PROTOCOL;
+
     /// A server of a world that is not saved.
     pub fn new(terrain: Terrain, settings: ServerSettings) -> Self {
         Self::at(terrain, WorldId::random(), 0, settings)

@@ -16,11 +16,11 @@ use xxhash_rust::xxh3::Xxh3Default;
 use super::keys::{NUMBER, RESERVED};
 use crate::format::bytes::{Reader, put_number};
 use crate::format::{FormatError, plain};
+use crate::net::ContentId;
 use crate::net::encoding::EntryWriter;
-use crate::net::message::Entry;
-use crate::net::{ContentId, PROTOCOL};
+use crate::net::message::{Entry, PROTOCOL};
 use crate::store::Store;
-use crate::terrain::{SIMULATION, Terrain};
+use crate::terrain::Terrain;
 
 /// Below [`RESERVED`].
 const ORDER: &str = "order/";
@@ -270,7 +270,7 @@ fn state_of(terrain: &Terrain) -> u64 {
     }
     hash.update(&plain::to_bytes(&terrain.rules()));
     hash.update(&plain::to_bytes(&terrain.loose()));
-    [SIMULATION, PROTOCOL].iter().for_each(|number| hash.update(&number.to_le_bytes()));
+    [Terrain::SIMULATION, PROTOCOL].iter().for_each(|number| hash.update(&number.to_le_bytes()));
     hash.digest()
 }
 

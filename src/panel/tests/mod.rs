@@ -250,9 +250,9 @@ fn rules_and_loose_pieces_are_set_where_they_are_shown() {
     let clay = crate::ground::MaterialId(4);
     assert_eq!((rules.bedrock, rules.unbreakable.first()), (Some(0), Some(&clay)));
     assert!((100..160).contains(&rules.hardness[&clay]), "{rules:?}");
-    let default = LooseGround::default();
+    let default = LooseSettings::default();
     let largest = loose.expect("switched on").largest;
-    assert_eq!(loose, Some(LooseGround { largest, ..default }));
+    assert_eq!(loose, Some(LooseSettings { largest, ..default }));
     assert!((100..1000).contains(&largest), "the middle of a logarithmic slider: {largest}");
     for name in ["Bedrock", "Unbreakable", "Find after digs"] {
         screen.choose(name);

@@ -12,15 +12,12 @@ use bevy::mesh::{Indices, Mesh, PrimitiveTopology, VertexAttributeValues};
 
 use super::ground_depth::{Heights, NodeHeights, depth};
 use super::palettes::{Arranged, Palettes};
-use super::vertex_kind::{
-    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
-    CUT_VOXELS, VertexExtras,
-};
+use super::vertex_kind::{CUT_VOXELS, VertexExtras};
 use crate::ground::Ground;
 use crate::lattice::{Column, LatticeBox, ONE, SNAP};
 use crate::plugin::MeshBytes;
 use crate::surface::{self, MaterialMix, SurfaceMesh, Vertex, tile};
-use crate::terrain::{SurfaceDraft, TileUpdate, World};
+use crate::terrain::{SurfaceDraft, Terrain, TileUpdate, World};
 use crate::world::sky::{Light, LitWorld, SkyColumns, SkyLights, SparseSky};
 
 /// The components of an entity in addition to its mesh: bounds that Bevy need not compute, and bytes.
@@ -271,17 +268,20 @@ impl<'a> Arrays<'a> {
         let mut mesh = Mesh::new(PrimitiveTopology::TriangleList, self.mesh_builder.usages)
             .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, self.positions)
             .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, self.normals)
-            .with_inserted_attribute(ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(ids))
-            .with_inserted_attribute(ATTRIBUTE_MATERIAL_WEIGHTS, VertexAttributeValues::Unorm8x4(weights))
+            .with_inserted_attribute(Terrain::ATTRIBUTE_MATERIAL_IDS, VertexAttributeValues::Uint8x4(ids))
+            .with_inserted_attribute(
+                Terrain::ATTRIBUTE_MATERIAL_WEIGHTS,
+                VertexAttributeValues::Unorm8x4(weights),
+            )
             .with_inserted_indices(match indices {
                 surface::Indices::U16(list) => Indices::U16(list),
                 surface::Indices::U32(list) => Indices::U32(list),
             });
         if self.mesh_builder.extras.has_depth {
-            mesh.insert_attribute(ATTRIBUTE_GROUND_DEPTH, self.depths);
+            mesh.insert_attribute(Terrain::ATTRIBUTE_GROUND_DEPTH, self.depths);
         }
         if !self.lights.is_empty() {
-            mesh.insert_attribute(ATTRIBUTE_SKY_LIGHT, VertexAttributeValues::Unorm8x4(self.lights));
+            mesh.insert_attribute(Terrain::ATTRIBUTE_SKY_LIGHT, VertexAttributeValues::Unorm8x4(self.lights));
         }
         if !self.mesh_builder.extras.colors.is_empty() {
             mesh.insert_attribute(Mesh::ATTRIBUTE_COLOR, self.colors);
@@ -324,7 +324,7 @@ mod tests {
     use crate::lod::Cut;
     use crate::plugin::MaterialColors;
     use crate::plugin::meshes::VertexKind;
-    use crate::terrain::{MeshKey, NodeUpdate, Terrain, TerrainSettings};
+    use crate::terrain::{MeshKey, NodeUpdate, TerrainSettings};
 
     const SKIN: ColumnMaterial = ColumnMaterial { base: MaterialId(0), overlay: MaterialId(1), blend: 255 };
 

@@ -11,8 +11,5 @@ pub(super) use builder::MeshBuilder;
 pub(super) use new_mesh::PendingMesh;
 pub(super) use processor::{BuildSettings, BuiltNode, BuiltSurface, SurfaceBuilder, node_origin};
 pub use processor::{CommitAction, Part, SurfaceProcessor, SurfaceProcessors};
-pub use vertex_kind::{
-    ATTRIBUTE_GROUND_DEPTH, ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT,
-    CUT_VOXELS,
-};
+pub use vertex_kind::CUT_VOXELS;
 pub(super) use vertex_kind::{VertexExtras, VertexKind};

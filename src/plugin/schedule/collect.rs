@@ -12,17 +12,17 @@ use crate::plugin::entities::places::{Places, is_usable};
 use crate::plugin::figures::MainThread;
 use crate::plugin::reports::{Report, Reports};
 use crate::plugin::{
-    BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LooseGround, LoosePieceFound, LoosePieceReturned,
+    BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned,
     Redo, TargetedBrush, Undo,
 };
-use crate::terrain::{Asked, Order, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique};
+use crate::terrain::{Asked, LooseSettings, Order, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique};
 use crate::threads::free_later;
 
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected
 /// at once, and so is a brush that reaches no terrain. Edits of a terrain with an [`EditOutbox`] are put there instead.
 pub(in crate::plugin) fn collect_brushes(
     mut requests: Requests,
-    mut terrains: Query<(Entity, &mut Terrain, Option<&LooseGround>, Option<&mut EditOutbox>)>,
+    mut terrains: Query<(Entity, &mut Terrain, Option<&LooseSettings>, Option<&mut EditOutbox>)>,
     places: Places,
     mut answers: MessageWriter<BrushApplied>,
     mut found: MessageWriter<LoosePieceFound>,
@@ -32,7 +32,7 @@ pub(in crate::plugin) fn collect_brushes(
     let start = Instant::now();
     let (brushes, targeted) = requests.take_brushes();
     for (entity, mut terrain, loose, _) in &mut terrains {
-        let loose = loose.map(|&loose| loose.into());
+        let loose = loose.copied();
         if loose.is_some() && loose.as_ref() != terrain.loose() {
             terrain.set_loose(loose);
         }
@@ -235,19 +235,19 @@ pub(super) fn pieces_again(terrain: Entity, receipt: &Receipt) -> impl Iterator<
     pieces.map(move |(tag, piece)| LoosePieceFound { terrain, tag: *tag, piece: piece.clone(), mesh: None })
 }
 
-/// Makes a terrain that gets [`LooseGround`] search for pieces at once.
+/// Makes a terrain that gets [`LooseSettings`] search for pieces at once.
 pub(in crate::plugin) fn enable_loose_search(
-    new: On<Insert, (LooseGround, Terrain)>,
-    mut terrains: Query<(&mut Terrain, &LooseGround), Allow<Disabled>>,
+    new: On<Insert, (LooseSettings, Terrain)>,
+    mut terrains: Query<(&mut Terrain, &LooseSettings), Allow<Disabled>>,
 ) {
     if let Ok((mut terrain, &loose)) = terrains.get_mut(new.entity) {
-        terrain.set_loose(Some(loose.into()));
+        terrain.set_loose(Some(loose));
     }
 }
 
-/// Makes a terrain that loses [`LooseGround`] stop searching for pieces.
+/// Makes a terrain that loses [`LooseSettings`] stop searching for pieces.
 pub(in crate::plugin) fn disable_loose_search(
-    gone: On<Remove, LooseGround>,
+    gone: On<Remove, LooseSettings>,
     mut terrains: Query<&mut Terrain, Allow<Disabled>>,
 ) {
     if let Ok(mut terrain) = terrains.get_mut(gone.entity) {

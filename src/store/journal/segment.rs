@@ -17,7 +17,7 @@ use crate::format::{Batch, FormatError};
 use crate::ground::Ground;
 use crate::store::base_level::LevelName;
 use crate::store::files::{Files, is_refused, read_file};
-use crate::terrain::SIMULATION;
+use crate::terrain::Terrain;
 
 /// The folder of segments, and of the content that they name.
 pub(in crate::store) use super::contents::FOLDER;
@@ -68,7 +68,7 @@ fn key(frame: u64) -> [u8; 8] {
 pub(in crate::store) fn base(ground: u64, level: Option<&LevelName>) -> u64 {
     let level = level.map_or(0, |level| level.hash.rotate_left(1));
     // Any odd number keeps simulations apart.
-    ground ^ level ^ u64::from(SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
+    ground ^ level ^ u64::from(Terrain::SIMULATION).wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
 /// An entry of a segment.

@@ -54,7 +54,7 @@ pub(in crate::store) struct Findings {
     pub is_lossy: bool,
     /// Set if the ground changed since the save: the number of affected regions, and how they were converted.
     pub base_changed: Option<(usize, &'static str)>,
-    /// Commits of another [`SIMULATION`](crate::terrain::SIMULATION) that were replayed.
+    /// Commits of another [`Terrain::SIMULATION`](crate::terrain::Terrain::SIMULATION) that were replayed.
     pub replayed: Option<u64>,
     /// Whether everything but the regions is lost.
     pub has_lost_rest: bool,

@@ -14,7 +14,7 @@ use crate::store::error::StoreError;
 use crate::store::journal::segment::FRAME_LIMIT;
 use crate::store::progress::Work;
 use crate::store::regions::{Region, keys};
-use crate::terrain::SIMULATION;
+use crate::terrain::Terrain;
 
 /// The share of opening after which regions are encoded.
 const SAVED: f32 = 0.97;
@@ -115,7 +115,7 @@ impl Writer {
             hash: *hash,
             next_field: *next_field,
             edit_settings: edit_settings.clone(),
-            simulation: SIMULATION,
+            simulation: Terrain::SIMULATION,
             ground: self.ground.hash(),
             game,
         }

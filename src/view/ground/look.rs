@@ -8,8 +8,7 @@ use crate::plugin::{SkyLight, SlimVertices};
 pub const MAX_LAYERS: usize = 16;
 
 /// The look of a terrain's ground, whose meshes then have [`SlimVertices`]. Put it on the terrain's entity instead of a
-/// material, and [`GroundPlugin`](super::GroundPlugin) creates and updates its
-/// [`GroundMaterial`](super::GroundMaterial).
+/// material, and `GroundPlugin` creates and updates its [`GroundMaterial`](super::GroundMaterial).
 ///
 /// A [`MaterialId`](crate::ground::MaterialId) is the number of a layer of the textures:
 /// [`GroundTextures`](super::GroundTextures). Changes made before `PostUpdate` show in the same frame, on the terrain's

@@ -16,7 +16,7 @@ use bevy::shader::{ShaderDefVal, ShaderRef};
 
 use super::super::vertex::prepass_vertex_shader;
 use super::look::{GroundLayer, GroundLook, GroundQuality, MAX_LAYERS};
-use crate::plugin::{ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS, ATTRIBUTE_SKY_LIGHT};
+use crate::terrain::Terrain;
 
 /// The material of terrains with a [`GroundLook`]: lit like Bevy's `StandardMaterial`, with colour, roughness and
 /// relief from layers of texture. Shadows, fog, clustered decals, prepasses and deferred rendering work as they do
@@ -273,7 +273,7 @@ impl MaterialExtension for GroundExtension {
             Mesh::ATTRIBUTE_POSITION.at_shader_location(0),
             Mesh::ATTRIBUTE_NORMAL.at_shader_location(1),
         ];
-        let own = [ATTRIBUTE_MATERIAL_IDS, ATTRIBUTE_MATERIAL_WEIGHTS];
+        let own = [Terrain::ATTRIBUTE_MATERIAL_IDS, Terrain::ATTRIBUTE_MATERIAL_WEIGHTS];
         if own.iter().all(|attribute| layout.0.contains(attribute.id)) {
             attributes.extend(
                 own.iter().zip(8..).map(|(attribute, location)| attribute.at_shader_location(location)),
@@ -285,8 +285,8 @@ impl MaterialExtension for GroundExtension {
             }
         }
         // Pieces have none.
-        if layout.0.contains(ATTRIBUTE_SKY_LIGHT.id) {
-            attributes.push(ATTRIBUTE_SKY_LIGHT.at_shader_location(10));
+        if layout.0.contains(Terrain::ATTRIBUTE_SKY_LIGHT.id) {
+            attributes.push(Terrain::ATTRIBUTE_SKY_LIGHT.at_shader_location(10));
             let definition = ShaderDefVal::from("GROUND_SKY_LIGHT");
             descriptor.vertex.shader_defs.push(definition.clone());
             if let Some(fragment) = &mut descriptor.fragment {

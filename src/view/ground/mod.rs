@@ -35,9 +35,9 @@ pub use fit::GroundTexturesError;
 #[doc(hidden)]
 pub use look::MAX_LAYERS;
 pub use look::{ColorMap, GroundLayer, GroundLook, GroundQuality};
+pub use material::GroundMaterial;
 #[doc(hidden)]
-pub use material::GroundBase;
-pub use material::{GroundExtension, GroundMaterial};
+pub use material::{GroundBase, GroundExtension};
 pub use pack::{GroundArrays, GroundArraysError, GroundLayerImages};
 pub use textures::{GroundLoading, GroundTextures};
 
@@ -57,6 +57,7 @@ use material::GroundUniform;
 
 /// Applies materials and textures to terrains that have a [`GroundLook`]. Does nothing without a renderer. Add it after
 /// Bevy's plugins; otherwise no ground is drawn and an error is logged.
+#[doc(hidden)]
 #[derive(Default)]
 pub struct GroundPlugin;
 

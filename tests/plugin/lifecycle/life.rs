@@ -50,8 +50,8 @@ impl Expected {
     }
 }
 
-pub(super) fn loose() -> LooseGround {
-    LooseGround { crumbs: 64, debris: 4096, ..default() }
+pub(super) fn loose() -> LooseSettings {
+    LooseSettings { crumbs: 64, debris: 4096, ..default() }
 }
 
 /// Makes transactions slow while it is asked to, so that things happen in the middle of them.
