@@ -11,7 +11,8 @@ use super::segment::Frame;
 use super::shared::{GameData, apply_game};
 use crate::ground::Ground;
 use crate::terrain::{
-    Asked, CommitRecord, Meshing, Order, Patch, ReplayError, Terrain, TerrainSettings, WorkLimits, WorldParts,
+    CommitRecord, Meshing, Order, OrderKind, Patch, ReplayError, Terrain, TerrainSettings, WorkLimits,
+    WorldParts,
 };
 
 /// The share of opening after which a world is recovered that has to be saved whole.
@@ -152,7 +153,7 @@ fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), 
     // Without an entry, all of its edits were rejected.
     if !record.entries.is_empty() {
         let receipts = terrain.apply(orders);
-        let mut others = receipts.iter().filter(|receipt| receipt.asked != Asked::Edit);
+        let mut others = receipts.iter().filter(|receipt| receipt.kind != OrderKind::Edit);
         if let Some(why) = others.find_map(|receipt| receipt.outcome.as_ref().err()) {
             return Err(ReplayError::of(why, record.revision));
         }

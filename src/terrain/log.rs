@@ -30,7 +30,7 @@ impl RecordDraft {
             (None::<[EditSettings; 2]>, Vec::with_capacity(submissions.len() + 2));
         for (submission, receipt) in submissions.iter().zip(receipts) {
             let (Ok(order), Ok(_)) = (&submission.order, &receipt.outcome) else { continue };
-            if order.asked().is_logged_as_change() {
+            if order.kind().is_logged_as_change() {
                 entries.push(LogEntry::Change);
                 continue;
             }

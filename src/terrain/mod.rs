@@ -74,7 +74,7 @@ pub(crate) use pending_display::PendingDisplay;
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
-pub use receipt::{Applied, Asked, ChunkScenario, Receipt, Rejection, ScenarioCounts};
+pub use receipt::{Applied, ChunkScenario, OrderKind, Receipt, Rejection, ScenarioCounts};
 pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::receipt::{Asked, Rejection};
+use super::receipt::{OrderKind, Rejection};
 #[cfg(feature = "plugin")]
 use crate::brush::BrushError;
 use crate::brush::{Brush, Edit};
@@ -61,15 +61,15 @@ impl Order {
     }
 
     /// The order's kind, as its receipt names it.
-    pub fn asked(&self) -> Asked {
+    pub fn kind(&self) -> OrderKind {
         match self {
-            Self::Edit(_) => Asked::Edit,
-            Self::Undo => Asked::Undo,
-            Self::Redo => Asked::Redo,
-            Self::Parts { .. } => Asked::Parts,
-            Self::Ground(_) => Asked::Ground,
-            Self::Rules(_) => Asked::Rules,
-            Self::Loose(_) => Asked::Loose,
+            Self::Edit(_) => OrderKind::Edit,
+            Self::Undo => OrderKind::Undo,
+            Self::Redo => OrderKind::Redo,
+            Self::Parts { .. } => OrderKind::Parts,
+            Self::Ground(_) => OrderKind::Ground,
+            Self::Rules(_) => OrderKind::Rules,
+            Self::Loose(_) => OrderKind::Loose,
         }
     }
 
@@ -134,8 +134,8 @@ impl Request {
     }
 
     /// The kind of its order. Only edits are invalid.
-    pub(super) fn asked(&self) -> Asked {
-        self.order.as_ref().map_or(Asked::Edit, Order::asked)
+    pub(super) fn kind(&self) -> OrderKind {
+        self.order.as_ref().map_or(OrderKind::Edit, Order::kind)
     }
 }
 

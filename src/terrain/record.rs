@@ -24,7 +24,7 @@ pub enum LogEntry {
 impl LogEntry {
     /// Whether it changes the world, and not only what later edits obey.
     fn is_commit(&self) -> bool {
-        !matches!(self, Self::Order(order) if order.asked().is_setting())
+        !matches!(self, Self::Order(order) if order.kind().is_setting())
     }
 }
 
@@ -61,7 +61,7 @@ impl CommitRecord {
     pub fn has_change(&self) -> bool {
         let is_change = |entry: &LogEntry| match entry {
             LogEntry::Change => true,
-            LogEntry::Order(order) => order.asked().is_logged_as_change(),
+            LogEntry::Order(order) => order.kind().is_logged_as_change(),
         };
         self.entries.iter().any(is_change)
     }

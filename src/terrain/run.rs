@@ -151,7 +151,7 @@ impl Transaction {
     /// The commit that changes nothing and rejects all orders.
     pub(super) fn rejected(&self) -> Commit {
         let rejected = |own: &Submission| Receipt {
-            asked: own.asked(),
+            kind: own.kind(),
             tag: own.tag,
             outcome: Err(own.order.as_ref().err().cloned().unwrap_or(Rejection::Panicked)),
         };

@@ -33,7 +33,7 @@ pub(super) fn orders(scene: Scene, submissions: &[Submission], target: Option<&U
         (Some((_, Order::Parts { change, hash })), _) => parts::parts(scene, change, *hash),
         (Some((_, Order::Ground(ground))), _) => parts::ground(scene, ground),
         (Some((own, Order::Edit(edit))), _) if edit.kind() == Kind::Reset => reset::reset(scene, own, edit),
-        (Some((_, step)), Some(target)) => step::step(scene, step.asked(), target),
+        (Some((_, step)), Some(target)) => step::step(scene, step.kind(), target),
         _ => edits::edits(scene, submissions),
     };
     resolved.stages.whole = start.elapsed();

@@ -12,7 +12,7 @@ use crate::ground::Ground;
 use crate::lattice::BrickPos;
 use crate::redraw::{Scene, Stages};
 use crate::terrain::parts_error::{PartsError, check_number};
-use crate::terrain::receipt::{Applied, Asked, Receipt};
+use crate::terrain::receipt::{Applied, OrderKind, Receipt};
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, pristine_layers};
 use crate::world::{Change, ChangedBrick, Meshing, Patch, World, brick_over};
@@ -43,21 +43,21 @@ fn checked(
 
 /// Resolves replaced parts; `hash` is the one that the world must have afterwards.
 pub(crate) fn parts(scene: Scene, change: &Patch, hash: Option<u64>) -> Resolved {
-    answered(scene.world, Asked::Parts, replaced(scene, change, hash, true))
+    answered(scene.world, OrderKind::Parts, replaced(scene, change, hash, true))
 }
 
 /// Resolves another ground.
 pub(crate) fn ground(scene: Scene, ground: &Arc<Ground>) -> Resolved {
-    answered(scene.world, Asked::Ground, on_ground(scene.world, ground))
+    answered(scene.world, OrderKind::Ground, on_ground(scene.world, ground))
 }
 
 /// Adds the receipt.
-fn answered(world: &World, asked: Asked, result: Result<(Resolved, Applied), PartsError>) -> Resolved {
+fn answered(world: &World, kind: OrderKind, result: Result<(Resolved, Applied), PartsError>) -> Resolved {
     let (resolved, outcome) = match result {
         Ok((resolved, applied)) => (resolved, Ok(applied)),
         Err(why) => (Resolved::nothing(world), Err(why.into())),
     };
-    Resolved { receipts: vec![Receipt::of(asked, outcome)], ..resolved }
+    Resolved { receipts: vec![Receipt::of(kind, outcome)], ..resolved }
 }
 
 /// A world of these parts. Nothing is meshed: surfaces are made when they are asked for.
