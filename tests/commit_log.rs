@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{
-    CommitRecord, LogEntry, MeshKey, Meshing, PartsError, Patch, ReplayError, RestoreError, SIMULATION, World,
+    CommitRecord, MeshKey, Meshing, PartsError, Patch, ReplayError, RestoreError, SIMULATION, World,
 };
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
@@ -254,14 +254,14 @@ fn rules_are_logged_where_they_bind() {
 }
 
 fn kinds_of(record: &CommitRecord) -> Vec<&'static str> {
-    let kind = |entry: &LogEntry| match entry {
-        LogEntry::Order(Order::Rules(None)) => "no rules",
-        LogEntry::Order(Order::Rules(Some(_))) => "rules",
-        LogEntry::Order(Order::Loose(_)) => "loose",
-        LogEntry::Order(Order::Edit(_)) => "edit",
+    let kind = |order: &Order| match order {
+        Order::Rules(None) => "no rules",
+        Order::Rules(Some(_)) => "rules",
+        Order::Loose(_) => "loose",
+        Order::Edit(_) => "edit",
         _ => "change",
     };
-    record.entries.iter().map(kind).collect()
+    record.orders.iter().map(kind).collect()
 }
 
 #[test]

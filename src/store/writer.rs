@@ -22,7 +22,7 @@ use super::unsaved;
 use crate::format::Batch;
 use crate::format::frame::WorldId;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Order, Patch, TerrainSettings};
+use crate::terrain::{CommitRecord, Order, TerrainSettings};
 
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
@@ -315,7 +315,7 @@ impl Writer {
         self.state.commits += 1;
         // Edits lead to the same bricks again.
         if !record.has_change() {
-            record.change = Patch::default();
+            record.change = Arc::default();
         }
         self.state.pending.push(record);
     }
@@ -436,8 +436,8 @@ impl Writer {
 
 /// The ground that a commit set, if it is one that did.
 fn new_ground(record: &CommitRecord) -> Option<Arc<Ground>> {
-    record.entries.iter().rev().find_map(|entry| match entry {
-        LogEntry::Order(Order::Ground(ground)) => Some(Arc::clone(ground)),
+    record.orders.iter().rev().find_map(|order| match order {
+        Order::Ground(ground) => Some(Arc::clone(ground)),
         _ => None,
     })
 }

@@ -75,7 +75,7 @@ pub(crate) use pending_display::PendingDisplay;
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
 pub use receipt::{Applied, ChunkScenario, OrderKind, Receipt, Rejection, ScenarioCounts};
-pub use record::{CommitRecord, LogEntry, SIMULATION, WorldParts};
+pub use record::{CommitRecord, SIMULATION, WorldParts};
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]
 pub use resolve::FieldChange;

@@ -80,8 +80,8 @@ impl OrderKind {
         matches!(self, Self::Undo | Self::Redo)
     }
 
-    /// Whether logs hold it as a change of parts, and not as an order.
-    pub(crate) fn is_logged_as_change(self) -> bool {
+    /// Whether logs hold it as the parts that it changed.
+    pub(crate) fn is_logged_as_parts(self) -> bool {
         matches!(self, Self::Undo | Self::Redo | Self::Parts)
     }
 
