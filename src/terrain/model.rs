@@ -274,7 +274,7 @@ impl Terrain {
             return Ok(Default::default());
         }
         let mut copy = commit.copy.take();
-        if let Some(whole) = commit.whole.take() {
+        if let Some(whole) = commit.outcome.whole.take() {
             copy = Some(std::mem::replace(&mut self.world, whole));
             self.drawn_cut = None;
             #[cfg(feature = "plugin")]

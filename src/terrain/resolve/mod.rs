@@ -19,7 +19,7 @@ mod step;
 
 pub use field_log::FieldChange;
 pub(crate) use parts::world_of;
-pub(crate) use resolved::{Resolved, install, patch_of};
+pub(crate) use resolved::{Outcome, Resolved};
 
 /// Resolves the orders of a transaction: edits, or one order of another kind; `target` is the content that a step
 /// through history restores.

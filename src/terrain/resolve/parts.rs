@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::replacement::Replacement;
-use super::resolved::{Resolved, install};
+use super::resolved::Resolved;
 use crate::backend::Cpu;
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
@@ -57,7 +57,7 @@ fn answered(world: &World, kind: OrderKind, result: Result<(Resolved, Applied), 
         Ok((resolved, applied)) => (resolved, Ok(applied)),
         Err(why) => (Resolved::nothing(world), Err(why.into())),
     };
-    Resolved { receipts: vec![Receipt::of(kind, outcome)], ..resolved }
+    resolved.with_receipt(Receipt::of(kind, outcome))
 }
 
 /// A world of these parts. Nothing is meshed: surfaces are made when they are asked for.
@@ -70,9 +70,9 @@ pub(crate) fn world_of(
     check_number(revision)?;
     let mut world = World::new(ground, chunk_size);
     let scene = Scene { world: &world, meshing: Meshing::Never, cut: None, backend: &Cpu };
-    let (Resolved { changes, uniform, next_field, meshes, .. }, _) = replaced(scene, &parts, None, false)?;
+    let (Resolved { outcome, meshes, .. }, _) = replaced(scene, &parts, None, false)?;
     // The replaced parts are pristine.
-    drop(install(&mut world, changes, uniform, meshes.kept(), next_field));
+    drop(outcome.install(&mut world, meshes.kept()));
     world.revision = revision;
     Ok(world)
 }
@@ -89,8 +89,10 @@ fn on_ground(before: &World, ground: &Arc<Ground>) -> Result<(Resolved, Applied)
         *brick = brick.take().map(|brick| brick_over(ground, *pos, brick));
     }
     let world = world_of(Arc::clone(ground), before.grid.size(), parts, before.revision)?;
-    let (next_field, whole) = (world.next_field, Some(Arc::new(world)));
-    Ok((Resolved { next_field, whole, ..Resolved::nothing(before) }, Applied::default()))
+    let mut resolved = Resolved::nothing(before);
+    resolved.outcome.next_field = world.next_field;
+    resolved.outcome.whole = Some(Arc::new(world));
+    Ok((resolved, Applied::default()))
 }
 
 /// Replaces parts. Without `counts` the receipt counts no voxels.
@@ -118,8 +120,9 @@ fn replaced(
         return Err(PartsError::Hash { found, expected });
     }
     replacement.update_mask();
-    let (resolved, applied) = replacement.resolve(0, Default::default());
-    Ok((Resolved { uniform, ..resolved }, applied))
+    let (mut resolved, applied) = replacement.resolve(0, Default::default());
+    resolved.outcome.uniform = uniform;
+    Ok((resolved, applied))
 }
 
 fn check_order(bricks: &[ChangedBrick]) -> Result<(), PartsError> {

@@ -22,5 +22,5 @@ pub(super) fn step(scene: Scene, kind: OrderKind, target: &UndoDelta) -> Resolve
         _ => (Vec::new(), pieces),
     };
     let applied = Applied { tags, returned, cut_again, ..applied };
-    Resolved { receipts: vec![Receipt::of(kind, Ok(applied))], ..resolved }
+    resolved.with_receipt(Receipt::of(kind, Ok(applied)))
 }
