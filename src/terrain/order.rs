@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use super::receipt::{OrderKind, Rejection};
-#[cfg(feature = "plugin")]
-use crate::brush::BrushError;
-use crate::brush::{Brush, Edit};
+use super::receipt::OrderKind;
+use crate::brush::{Brush, BrushError, Edit};
 use crate::edits::{EDIT_WORK, edit_work};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, LatticeBox};
@@ -58,6 +56,11 @@ impl Order {
     /// Replaces parts of the world; see [`Order::Parts`].
     pub fn parts(change: impl Into<Arc<Patch>>, hash: Option<u64>) -> Self {
         Self::Parts { change: change.into(), hash }
+    }
+
+    /// Sets the rules of later edits; see [`Order::Rules`].
+    pub fn rules(rules: DiggingRules) -> Self {
+        Self::Rules(Some(Arc::new(rules)))
     }
 
     /// The order's kind, as its receipt names it.
@@ -118,14 +121,23 @@ impl Order {
 pub struct Request {
     pub(super) tag: u64,
     pub(super) stroke: Option<u64>,
-    pub(super) order: Result<Order, Rejection>,
+    pub(super) order: Result<Order, BrushError>,
 }
 
 impl Request {
     /// A brush whose edit was made elsewhere.
     #[cfg(feature = "plugin")]
     pub(crate) fn of_edit(brush: &Brush, edit: Result<Edit, BrushError>) -> Self {
-        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit).map_err(Rejection::from) }
+        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit) }
+    }
+
+    /// The order.
+    ///
+    /// # Errors
+    /// When its brush or edit is invalid.
+    #[cfg(feature = "net")]
+    pub(crate) fn into_order(self) -> Result<Order, BrushError> {
+        self.order
     }
 
     /// The request's work, in bricks.
@@ -142,14 +154,14 @@ impl Request {
 impl From<&Brush> for Request {
     fn from(brush: &Brush) -> Self {
         let edit = Edit::quantize(brush);
-        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit).map_err(Rejection::from) }
+        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit) }
     }
 }
 
 impl From<Edit> for Request {
     fn from(edit: Edit) -> Self {
         let (tag, stroke) = (edit.tag(), edit.stroke());
-        Self { tag, stroke, order: edit.check().map(|()| Order::Edit(edit)).map_err(Rejection::from) }
+        Self { tag, stroke, order: edit.check().map(|()| Order::Edit(edit)) }
     }
 }
 

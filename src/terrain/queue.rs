@@ -109,6 +109,7 @@ impl Queue {
         self.open = is_edit.then_some((together, group));
         self.work += work;
         let Request { tag, order, .. } = request;
+        let order = order.map_err(Rejection::from);
         self.submissions.push_back(Submission { tag, order, group, edit_settings, work });
     }
 
