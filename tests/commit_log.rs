@@ -265,6 +265,22 @@ fn kinds_of(record: &CommitRecord) -> Vec<&'static str> {
 }
 
 #[test]
+fn an_undo_is_recorded_as_parts_that_share_the_change() {
+    let mut terrain = flat();
+    terrain.keep_log(Some(PLENTY));
+    terrain.apply([dig(20.0)]);
+    terrain.undo();
+    // It lies outside the world.
+    terrain.apply([dig(-900.0)]);
+    let records = terrain.take_log();
+    let [.., undone, rejected] = &records[..] else { panic!("{records:?}") };
+    let [Order::Parts { change, hash }] = &undone.orders[..] else { panic!("{:?}", undone.orders) };
+    assert!(Arc::ptr_eq(change, &undone.change) && !change.is_empty());
+    assert_eq!(*hash, Some(undone.hash));
+    assert!(rejected.orders.is_empty() && rejected.is_commit() && !rejected.has_change());
+}
+
+#[test]
 fn a_record_that_does_not_fit_is_an_error() {
     let mut terrain = flat();
     terrain.keep_log(Some(PLENTY));

@@ -30,9 +30,8 @@ impl RecordDraft {
     /// The record of a commit, by the orders, their receipts, and what changes.
     pub fn new(submissions: &[Submission], receipts: &[Receipt], change: Patch) -> Self {
         // With room for the first settings, if those before were others.
-        let (mut edit_settings, mut orders) =
-            (None::<[EditSettings; 2]>, Vec::with_capacity(submissions.len() + 2));
-        let mut is_parts = false;
+        let mut orders: Vec<Order> = Vec::with_capacity(submissions.len() + 2);
+        let (mut edit_settings, mut is_parts) = (None::<[EditSettings; 2]>, false);
         for (submission, receipt) in submissions.iter().zip(receipts) {
             let (Ok(order), Ok(_)) = (&submission.order, &receipt.outcome) else { continue };
             if order.kind().is_logged_as_parts() {
