@@ -430,8 +430,8 @@ pub mod prelude {
         WorldClosed, WorldOpened, WorldSaved, WorldStore,
     };
     pub use crate::terrain::{
-        Applied, Asked, History, LoosePiece, LooseSettings, Order, PieceFate, PieceId, Receipt, Rejection,
-        ReturnedPiece, ScenarioCounts, Span, Terrain, TerrainSettings,
+        Applied, History, LoosePiece, LooseSettings, Order, OrderKind, PieceFate, PieceId, Receipt,
+        Rejection, ReturnedPiece, ScenarioCounts, Span, Terrain, TerrainSettings,
     };
     #[cfg(feature = "render")]
     pub use crate::view::{

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::terrain::{
-    CommitRecord, LogEntry, MeshKey, Meshing, PartsError, Patch, ReplayError, RestoreError, World,
+    CommitRecord, MeshKey, Meshing, PartsError, Patch, ReplayError, RestoreError, World,
 };
 use bevy_burrow::volume::Brick;
 use fastrand::Rng;
@@ -254,14 +254,30 @@ fn rules_are_logged_where_they_bind() {
 }
 
 fn kinds_of(record: &CommitRecord) -> Vec<&'static str> {
-    let kind = |entry: &LogEntry| match entry {
-        LogEntry::Order(Order::Rules(None)) => "no rules",
-        LogEntry::Order(Order::Rules(Some(_))) => "rules",
-        LogEntry::Order(Order::Loose(_)) => "loose",
-        LogEntry::Order(Order::Edit(_)) => "edit",
+    let kind = |order: &Order| match order {
+        Order::Rules(None) => "no rules",
+        Order::Rules(Some(_)) => "rules",
+        Order::Loose(_) => "loose",
+        Order::Edit(_) => "edit",
         _ => "change",
     };
-    record.entries.iter().map(kind).collect()
+    record.orders.iter().map(kind).collect()
+}
+
+#[test]
+fn an_undo_is_recorded_as_parts_that_share_the_change() {
+    let mut terrain = flat();
+    terrain.keep_log(Some(PLENTY));
+    terrain.apply([dig(20.0)]);
+    terrain.undo();
+    // It lies outside the world.
+    terrain.apply([dig(-900.0)]);
+    let records = terrain.take_log();
+    let [.., undone, rejected] = &records[..] else { panic!("{records:?}") };
+    let [Order::Parts { change, hash }] = &undone.orders[..] else { panic!("{:?}", undone.orders) };
+    assert!(Arc::ptr_eq(change, &undone.change) && !change.is_empty());
+    assert_eq!(*hash, Some(undone.hash));
+    assert!(rejected.orders.is_empty() && rejected.is_commit() && !rejected.has_change());
 }
 
 #[test]

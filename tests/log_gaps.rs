@@ -8,7 +8,7 @@ use bevy_burrow::lattice::BrickPos;
 use bevy_burrow::prelude::*;
 use bevy_burrow::surface::SurfaceMesh;
 use bevy_burrow::terrain::{
-    CommitRecord, LogEntry, MeshKey, Meshing, ReplayError, Transaction, WorkLimits, WorldParts,
+    CommitRecord, MeshKey, Meshing, ReplayError, Transaction, WorkLimits, WorldParts,
 };
 use fastrand::Rng;
 use glam::Vec3;
@@ -39,8 +39,8 @@ fn follows(record: &CommitRecord, at: u64) -> bool {
 
 /// Returns `true` if it is a commit, and not only a change of rules and settings.
 fn is_commit(record: &CommitRecord) -> bool {
-    let of_commit = |entry: &LogEntry| matches!(entry, LogEntry::Order(Order::Edit(_)) | LogEntry::Change);
-    record.entries.is_empty() || record.entries.iter().any(of_commit)
+    let of_commit = |order: &Order| matches!(order, Order::Edit(_) | Order::Parts { .. });
+    record.orders.is_empty() || record.orders.iter().any(of_commit)
 }
 
 #[test]
@@ -113,9 +113,7 @@ fn rules_are_logged_once_nothing_waits_even_if_that_was_a_step_without_effect() 
     terrain.set_rules(rules()).expect("valid");
     assert!(terrain.begin().is_none());
     let records = terrain.take_log();
-    assert!(
-        matches!(&records[..], [record] if matches!(record.entries[..], [LogEntry::Order(Order::Rules(Some(_)))]))
-    );
+    assert!(matches!(&records[..], [record] if matches!(record.orders[..], [Order::Rules(Some(_))])));
 }
 
 #[test]
@@ -164,7 +162,7 @@ fn a_record_that_makes_more_than_one_commit_is_told() {
     leader.keep_log(Some(PLENTY));
     leader.apply([dig(20.0)]);
     let mut record = leader.take_log().pop().expect("a commit");
-    record.entries.push(LogEntry::Change);
+    record.orders.push(Order::parts(Arc::clone(&record.change), Some(record.hash)));
     assert!(matches!(flat().replay(&record), Err(ReplayError::Revision { .. })));
 }
 

@@ -121,7 +121,8 @@ fn a_thousand_receipts_balance_with_the_world() {
             let before = terrain.snapshot();
             let receipts = terrain.apply([&brush]);
             let after = terrain.world();
-            let [Receipt { asked: Asked::Edit, tag: 0, outcome: Ok(applied) }] = receipts.as_slice() else {
+            let [Receipt { kind: OrderKind::Edit, tag: 0, outcome: Ok(applied) }] = receipts.as_slice()
+            else {
                 // The edit's reach may end outside the world, although its enlarged box meets it.
                 assert_eq!(receipts[0].outcome, Err(Rejection::OutsideWorld), "{what}");
                 assert_eq!(after.hash(), before.hash(), "{what}");

@@ -64,7 +64,7 @@ fn print_receipts(mut receipts: MessageReader<BrushApplied>, terrains: Query<&Te
 
 fn print_steps(mut moves: MessageReader<HistoryMoved>, terrains: Query<&Terrain>) {
     for HistoryMoved { terrain, receipt } in moves.read() {
-        let name = receipt.asked;
+        let name = receipt.kind;
         let terrain = terrain.and_then(|terrain| terrains.get(terrain).ok());
         let hash = terrain.map_or(0, |terrain| terrain.world().hash());
         match &receipt.outcome {

@@ -72,7 +72,7 @@ fn enter_receipts(mut receipts: MessageReader<BrushApplied>, mut report: ResMut<
 fn enter_steps(mut moves: MessageReader<HistoryMoved>, mut report: ResMut<Report>) {
     for HistoryMoved { receipt, .. } in moves.read() {
         report.answered += 1;
-        let name = receipt.asked;
+        let name = receipt.kind;
         match &receipt.outcome {
             Ok(restored) if !report.quiet => {
                 say(format_args!(

@@ -20,7 +20,7 @@ use super::plain;
 use crate::brush::Content;
 use crate::brush::Edit;
 use crate::ground::Ground;
-use crate::terrain::{CommitRecord, LogEntry, Order, Patch};
+use crate::terrain::{CommitRecord, Order};
 use crate::volume::DiggingRules;
 
 const RULES: u8 = 0;
@@ -32,7 +32,7 @@ const GROUND: u8 = 4;
 /// A sequence of commits, and the game's data up to the last of them.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Commits in order. A change is stored only with an entry [`LogEntry::Change`]; changes of edits are computed
+    /// Commits in order. A change is stored only with an order of [parts](Order::Parts); changes of edits are computed
     /// again.
     pub commits: Vec<CommitRecord>,
     /// Changes of the game's data, in order; `None` if it removed a key.
@@ -58,8 +58,8 @@ impl Batch {
         let mut revision = self.commits.first().map_or(0, |first| first.revision.wrapping_sub(1));
         put_number(bytes, revision);
         for commit in &self.commits {
-            match &*commit.entries {
-                [LogEntry::Order(Order::Edit(edit))] if commit.revision == revision.wrapping_add(1) => {
+            match &*commit.orders {
+                [Order::Edit(edit)] if commit.revision == revision.wrapping_add(1) => {
                     let at = bytes.len();
                     put_edit(bytes, edit, &mut edits);
                     if let Some(head) = bytes.get_mut(at) {
@@ -97,16 +97,15 @@ impl Batch {
         let mut batch = Self::default();
         for _ in 0..count {
             let head = reader.byte()?;
-            let mut commit = match head {
+            let commit = match head {
                 0 => read_commit(&mut reader, revision, edits, ground)?,
                 odd if odd & 1 == 1 => {
-                    let entries = vec![LogEntry::Order(Order::Edit(edits.read(head >> 1, &mut reader)?))];
-                    let (revision, change) = (revision.wrapping_add(1), Patch::default());
-                    CommitRecord { number: 0, revision, hash: 0, entries, change }
+                    let orders = vec![Order::Edit(edits.read(head >> 1, &mut reader)?)];
+                    let (revision, hash) = (revision.wrapping_add(1), u64::from_le_bytes(reader.array()?));
+                    CommitRecord { number: 0, revision, hash, orders, change: Arc::default() }
                 }
                 _ => return Err(FormatError::Invalid("commit")),
             };
-            commit.hash = u64::from_le_bytes(reader.array()?);
             revision = commit.revision;
             batch.commits.push(commit);
         }
@@ -141,11 +140,8 @@ impl Batch {
 
     /// The content of its edits, each as often as an edit has it.
     pub(crate) fn contents(&self) -> impl Iterator<Item = (ContentId, Content<'_>)> {
-        let entries = self.commits.iter().flat_map(|commit| &commit.entries);
-        let edits = entries.filter_map(|entry| match entry {
-            LogEntry::Order(Order::Edit(edit)) => Some(edit),
-            _ => None,
-        });
+        let orders = self.commits.iter().flat_map(|commit| &commit.orders);
+        let edits = orders.filter_map(Order::edit);
         edits.flat_map(|edit| edit.contents()).map(|content| (ContentId::of_content(content), content))
     }
 
@@ -209,28 +205,27 @@ fn read_names(reader: &mut Reader) -> Result<Vec<ContentId>, FormatError> {
 fn put_commit(to: &mut Vec<u8>, commit: &CommitRecord, before: u64, edits: &mut EditSequence) {
     to.push(0);
     put_signed(to, commit.revision.wrapping_sub(before).cast_signed());
-    put_number(to, commit.entries.len() as u64);
-    for entry in &commit.entries {
-        match entry {
-            LogEntry::Order(Order::Rules(rules)) => {
+    put_number(to, commit.orders.len() as u64);
+    for order in &commit.orders {
+        match order {
+            Order::Rules(rules) => {
                 to.push(RULES);
                 put_bytes(to, &plain::to_bytes(&rules.as_deref()));
             }
-            LogEntry::Order(Order::Loose(loose)) => {
+            Order::Loose(loose) => {
                 to.push(LOOSE);
                 put_bytes(to, &plain::to_bytes(loose));
             }
-            LogEntry::Order(Order::Edit(edit)) => {
+            Order::Edit(edit) => {
                 to.push(EDIT);
                 put_edit(to, edit, edits);
             }
-            LogEntry::Change => to.push(CHANGE),
-            LogEntry::Order(Order::Ground(ground)) => {
+            Order::Ground(ground) => {
                 to.push(GROUND);
                 to.extend_from_slice(&ground.hash().to_le_bytes());
             }
-            // The log keeps these as changes.
-            LogEntry::Order(Order::Undo | Order::Redo | Order::Parts { .. }) => to.push(CHANGE),
+            // The commit's change follows once, after all orders.
+            Order::Undo | Order::Redo | Order::Parts { .. } => to.push(CHANGE),
         }
     }
     if commit.has_change() {
@@ -238,7 +233,7 @@ fn put_commit(to: &mut Vec<u8>, commit: &CommitRecord, before: u64, edits: &mut 
     }
 }
 
-/// Reads what [`put_commit`] appended after its 0.
+/// Reads what [`put_commit`] appended after its 0, and the hash.
 fn read_commit(
     reader: &mut Reader,
     before: u64,
@@ -246,29 +241,36 @@ fn read_commit(
     ground: &Ground,
 ) -> Result<CommitRecord, FormatError> {
     let revision = before.wrapping_add(reader.signed()?.cast_unsigned());
-    let mut entries = Vec::new();
+    let mut orders = Vec::new();
     for _ in 0..reader.count()? {
-        entries.push(match reader.byte()? {
+        orders.push(match reader.byte()? {
             RULES => {
                 let rules: Option<DiggingRules> = plain::from_bytes(reader.bytes()?, "set of rules")?;
-                LogEntry::Order(Order::Rules(rules.map(Arc::new)))
+                Order::Rules(rules.map(Arc::new))
             }
             LOOSE => {
                 let loose = plain::from_bytes(reader.bytes()?, "search for loose pieces")?;
-                LogEntry::Order(Order::Loose(loose))
+                Order::Loose(loose)
             }
             EDIT => {
                 let head = reader.byte()?;
-                LogEntry::Order(Order::Edit(edits.read(head, reader)?))
+                Order::Edit(edits.read(head, reader)?)
             }
-            CHANGE => LogEntry::Change,
+            // Its change and hash follow.
+            CHANGE => Order::Parts { change: Arc::default(), hash: None },
             GROUND => return Err(FormatError::Invalid("commit: it sets another ground, which no log holds")),
             _ => return Err(FormatError::Invalid("entry of a commit")),
         });
     }
-    let mut commit = CommitRecord { number: 0, revision, hash: 0, entries, change: Patch::default() };
+    let mut commit = CommitRecord { number: 0, revision, hash: 0, orders, change: Arc::default() };
     if commit.has_change() {
-        commit.change = read_change(reader, ground)?;
+        commit.change = Arc::new(read_change(reader, ground)?);
+    }
+    commit.hash = u64::from_le_bytes(reader.array()?);
+    for order in &mut commit.orders {
+        if let Order::Parts { change, hash } = order {
+            (*change, *hash) = (Arc::clone(&commit.change), Some(commit.hash));
+        }
     }
     Ok(commit)
 }

@@ -10,7 +10,7 @@
 //!   Ack                               ->                  what has arrived
 //!   Edits, Undo                       ->
 //!                                     <-   Entries with these, or Refused
-//!                                     <-   Hashes after a mark
+//!                                     <-   Hashes after a hash check
 //!   Fetch, where hashes differ        ->
 //!                                     <-   Piece ...      (bulk) these regions at a later number
 //!   Images, where edits hold others   ->
@@ -18,9 +18,9 @@
 //! ```
 //!
 //! A session can start again at any moment, over the same connection or a new one. Each greeting names a new
-//! **stream**; messages that arrive in a lane before the mark of that stream belong to an earlier one and are dropped.
-//! A client repeats its greeting until it is answered, and a server that does not know a connected client asks it to
-//! [greet](ToClient::Greet).
+//! **stream**; messages that arrive in a lane before the [start](ToClient::Stream) of that stream belong to an earlier
+//! one and are dropped. A client repeats its greeting until it is answered, and a server that does not know a connected
+//! client asks it to [greet](ToClient::Greet).
 //!
 //! The **log** is a sequence of [entries](Entry) with consecutive numbers from 1. The world *at number n* is the
 //! pristine world after the entries 1 to n. All clients that have applied them in order have the same world.
@@ -87,7 +87,7 @@ pub enum Entry {
         /// The order. The tag of an edit is 0 and it has no stroke: these concern its author and the server.
         order: Order,
     },
-    /// Changes nothing. The hashes of regions that were touched since the previous mark are compared here.
+    /// Changes nothing. The hashes of regions that were touched since the previous hash check are compared here.
     HashCheck,
 }
 
@@ -102,7 +102,7 @@ impl Entry {
         Self::Order { by: None, order }
     }
 
-    /// The order to a terrain; `None` for a mark.
+    /// The order to a terrain; `None` for a hash check.
     pub fn order(&self) -> Option<&Order> {
         if let Self::Order { order, .. } = self { Some(order) } else { None }
     }
@@ -168,7 +168,7 @@ pub struct Hello {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ToServer {
-    /// Starts the only session of this connection: the answer has no [stream](ToClient::Stream) marks.
+    /// Starts the only session of this connection: the answer has no [`ToClient::Stream`].
     Hello(Hello),
     /// Starts a session, or starts it again. Both lanes of the answer begin with a [`ToClient::Stream`] of this number.
     Greeting {
@@ -309,9 +309,9 @@ pub enum ToClient {
         /// Why.
         why: Refusal,
     },
-    /// The hashes at this mark of regions that were touched since the previous mark.
+    /// The hashes at this hash check of regions that were touched since the previous one.
     Hashes {
-        /// The number of the mark.
+        /// The number of the hash check.
         number: u64,
         /// In order.
         regions: RegionHashes,

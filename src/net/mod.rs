@@ -85,8 +85,8 @@ pub use message::{
 pub use regions::{region_hash, touched_regions};
 #[doc(hidden)]
 pub use server::{
-    Admission, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings, UndoPolicy,
-    UnknownContent,
+    Admission, OrderError, Outgoing, Permission, Reach, Server, ServerEvent, ServerFigures, ServerSettings,
+    UndoPolicy,
 };
 
 /// Prepares a terrain that is never shown: it builds no meshes, keeps no history, and accepts all work.

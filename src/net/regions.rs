@@ -29,13 +29,13 @@ pub(super) fn run_submitted(
     (receipts, regions)
 }
 
-/// The hash of a region in marks and tables: of its [samples](World::region_hash), and of the names of the fields in
-/// all chunks that reach into it. 0 for a pristine region.
+/// The hash of a region in hash checks and tables: of its [samples](World::region_hash), and of the names of the fields
+/// in all chunks that reach into it. 0 for a pristine region.
 pub fn region_hash(world: &World, region: RegionPos) -> u64 {
     hash_with_names(world, region, world.region_hash(region))
 }
 
-/// The hashes of regions' samples, kept up to date with each patch. Otherwise a mark would hash all bricks of the
+/// The hashes of regions' samples, kept up to date with each patch. Otherwise a hash check would hash all bricks of the
 /// regions that changed since the last one, in one tick.
 #[derive(Clone, Debug, Default)]
 pub(super) struct RegionSums(FxHashMap<RegionPos, u64>);

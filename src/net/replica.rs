@@ -16,7 +16,7 @@ use crate::edits::max_read_around;
 use crate::ground::Ground;
 use crate::lattice::{BrickPos, ChunkPos, LatticeBox, RegionPos};
 use crate::terrain::{
-    Asked, Order, Patch, Receipt, Rejection, RestoreError, Terrain, TerrainError, TerrainSettings, World,
+    Order, OrderKind, Patch, Receipt, Rejection, RestoreError, Terrain, TerrainError, TerrainSettings, World,
     WorldParts,
 };
 use crate::volume::{Brick, Fields};
@@ -232,7 +232,7 @@ impl Replica {
         }
         let applied = self.run();
         // A deterministic failure happens on all machines; the pending edits are predicted again.
-        let is_rejected = |receipt: &Receipt| receipt.asked == Asked::Edit && receipt.outcome.is_err();
+        let is_rejected = |receipt: &Receipt| receipt.kind == OrderKind::Edit && receipt.outcome.is_err();
         self.is_outdated |= applied.receipts.iter().any(is_rejected);
         if is_foreign && !self.is_outdated {
             self.changes_are_independent = !is_own && self.reads_nothing_of_before(next_field);
@@ -247,7 +247,7 @@ impl Replica {
         let Self { confirmed, sums, before, .. } = self;
         let keep = |world: &World, change: &Patch| before.keep(change.inverse(world));
         let (receipts, regions) = run_submitted(confirmed, sums, keep);
-        let mut parts = receipts.iter().filter(|receipt| receipt.asked == Asked::Parts);
+        let mut parts = receipts.iter().filter(|receipt| receipt.kind == OrderKind::Parts);
         let failed_locally = parts.any(Receipt::is_local_failure);
         Applied { receipts, regions, failed_locally }
     }

@@ -10,7 +10,7 @@ use super::*;
 use crate::brush::{Brush, BrushPath, Corridor, Shape, Stamp};
 use crate::ground::{GreyImage, MaterialId};
 use crate::net::ClientId;
-use crate::terrain::{Asked, LooseSettings, Order};
+use crate::terrain::{LooseSettings, Order, OrderKind};
 use crate::volume::DiggingRules;
 
 const SIDE: u32 = 72;
@@ -102,7 +102,7 @@ fn turn(rng: &mut Rng, reference: &Terrain) -> Entry {
 
 fn obey(terrain: &mut Terrain, entry: &Entry) {
     let receipts = terrain.apply(entry.order());
-    assert!(receipts.iter().all(|receipt| receipt.asked == Asked::Edit || receipt.outcome.is_ok()));
+    assert!(receipts.iter().all(|receipt| receipt.kind == OrderKind::Edit || receipt.outcome.is_ok()));
 }
 
 fn own_number(entry: &Entry) -> Option<u64> {

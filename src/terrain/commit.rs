@@ -7,34 +7,24 @@ use std::sync::Arc;
 use super::history::UndoDelta;
 use super::log::RecordDraft;
 use super::receipt::Receipt;
-use super::resolve::{FieldChange, Resolved, install, patch_of};
+use super::resolve::{FieldChange, Outcome, Resolved};
 use crate::lattice::{ChunkPos, LatticeBox, RegionPos};
 use crate::redraw::{DrawnCut, MeshUpdates, Stages};
-use crate::volume::UniformBricks;
 use crate::world::{NewSurfaces, Patch, World};
 
 /// The result of a transaction: only what changed.
 #[must_use = "nothing has changed before `Terrain::commit` takes it"]
 pub struct Commit {
     pub(super) ticket: u64,
-    /// The parts installed by groups of edits, in order, or by a step through history.
-    pub(super) changes: Vec<UndoDelta>,
-    pub(super) sample_hash: u64,
-    /// The pool of uniform bricks, if it has grown.
-    pub(super) uniform: Option<UniformBricks>,
-    pub(super) next_field: u64,
-    pub(super) receipts: Vec<Receipt>,
+    pub(super) outcome: Outcome,
     /// The record for the log, where one is kept.
     pub(super) record: Option<RecordDraft>,
-    pub(super) news: Vec<(ChunkPos, FieldChange)>,
     /// The surfaces that the world keeps: the meshes may be taken away before.
     pub(super) kept: NewSurfaces,
     /// The cut that is drawn afterwards, if it changes.
     pub(super) drawn_cut: Option<Arc<DrawnCut>>,
     /// Whether it only changes which nodes are drawn.
     pub(super) is_cut: bool,
-    /// The new world, if all of it is replaced.
-    pub(super) whole: Option<Arc<World>>,
     /// The world that this changes, if it is held elsewhere too.
     pub(super) copy: Option<Arc<World>>,
     /// Meshes to be swapped together with this commit. The world keeps its own.
@@ -64,18 +54,11 @@ pub(super) struct Installed {
 impl Commit {
     /// The commit of what a transaction's work leads to.
     pub(super) fn new(ticket: u64, is_cut: bool, resolved: Resolved) -> Self {
-        let Resolved { changes, sample_hash, uniform, next_field, receipts, news, whole, meshes, stages } =
-            resolved;
+        let Resolved { outcome, meshes, stages } = resolved;
         Self {
             ticket,
-            changes,
-            sample_hash,
-            uniform,
-            next_field,
-            receipts,
+            outcome,
             record: None,
-            news,
-            whole,
             copy: None,
             drawn_cut: meshes.drawn_cut.clone(),
             is_cut,
@@ -90,18 +73,18 @@ impl Commit {
         // A record holds it already, merged from all groups.
         match &self.record {
             Some(record) => record.change().clone(),
-            None => patch_of(&self.changes, self.whole.as_deref(), self.next_field),
+            None => self.outcome.patch(),
         }
     }
 
     /// Hash of every edited sample, once this is committed: equal for equal edits of equal samples, whatever ran them.
     pub fn sample_hash(&self) -> u64 {
-        self.sample_hash
+        self.outcome.sample_hash
     }
 
     /// Changes of fields in this commit, by chunk.
     pub fn field_news(&self) -> &[(ChunkPos, FieldChange)] {
-        &self.news
+        &self.outcome.news
     }
 
     /// The cut that is drawn after this commit, if any.
@@ -116,7 +99,7 @@ impl Commit {
 
     /// Returns `true` if another world replaces this one, so that all meshes are made again.
     pub fn is_whole(&self) -> bool {
-        self.whole.is_some()
+        self.outcome.whole.is_some()
     }
 
     /// Boxes around the bricks that it changes, one for each region of the lattice: what a long path passes by lies in
@@ -130,7 +113,7 @@ impl Commit {
 
     /// Adds the bricks that it changes to the boxes of their regions.
     pub(super) fn add_changed_boxes(&self, boxes: &mut BTreeMap<RegionPos, LatticeBox>) {
-        for (pos, _) in self.changes.iter().flat_map(|delta| &delta.change.patch.bricks) {
+        for (pos, _) in self.outcome.changes.iter().flat_map(|delta| &delta.change.patch.bricks) {
             let own = pos.samples();
             boxes.entry(RegionPos::of(*pos)).and_modify(|all| *all = all.union(own)).or_insert(own);
         }
@@ -139,14 +122,15 @@ impl Commit {
     /// The receipts of its orders.
     #[cfg(feature = "plugin")]
     pub(crate) fn receipts(&self) -> &[Receipt] {
-        &self.receipts
+        &self.outcome.receipts
     }
 
     /// Makes this the world.
-    pub(super) fn install(self, world: &mut World) -> Installed {
-        let replaced = install(world, self.changes, self.uniform, self.kept, self.next_field);
+    pub(super) fn install(mut self, world: &mut World) -> Installed {
+        let receipts = std::mem::take(&mut self.outcome.receipts);
+        let replaced = self.outcome.install(world, self.kept);
         world.revision += 1;
-        Installed { receipts: self.receipts, replaced }
+        Installed { receipts, replaced }
     }
 }
 

@@ -53,7 +53,7 @@ impl Terrain {
             };
             let mut commit = transaction.run();
             regions_hash = commit.sample_hash();
-            receipts.append(&mut commit.receipts);
+            receipts.append(&mut commit.outcome.receipts);
             change.then(commit.change());
             if queue.len() > 0 {
                 let mut next = World::clone(&world);

@@ -8,7 +8,7 @@ use super::edit_settings::EditSettings;
 use super::history::DeferredDrop;
 use super::model::{StaleCommit, Terrain};
 use super::pending_display::PendingDisplay;
-use super::receipt::{Asked, Receipt};
+use super::receipt::{OrderKind, Receipt};
 use crate::redraw::DrawnCut;
 #[cfg(feature = "store")]
 use crate::volume::RulesError;
@@ -28,20 +28,20 @@ impl Terrain {
     }
 
     /// What has no receipt yet, in order: its kind, and the tags of edits.
-    pub(crate) fn unanswered(&self) -> impl Iterator<Item = (Asked, u64)> {
+    pub(crate) fn unanswered(&self) -> impl Iterator<Item = (OrderKind, u64)> {
         let in_flight = self.in_flight.iter().flat_map(|waiting| waiting.work.submissions());
-        in_flight.chain(self.queue.iter()).map(|own| (own.asked(), own.tag))
+        in_flight.chain(self.queue.iter()).map(|own| (own.kind(), own.tag))
     }
 
     /// Whether there are receipts of such orders to take.
-    pub(crate) fn has_receipts(&self, is_wanted: impl Fn(Asked) -> bool) -> bool {
-        self.receipts.iter().any(|receipt| is_wanted(receipt.asked))
+    pub(crate) fn has_receipts(&self, is_wanted: impl Fn(OrderKind) -> bool) -> bool {
+        self.receipts.iter().any(|receipt| is_wanted(receipt.kind))
     }
 
     /// Takes the receipts of such orders; the others stay.
-    pub(crate) fn take_receipts_of(&mut self, is_wanted: impl Fn(Asked) -> bool) -> Vec<Receipt> {
+    pub(crate) fn take_receipts_of(&mut self, is_wanted: impl Fn(OrderKind) -> bool) -> Vec<Receipt> {
         let all = std::mem::take(&mut self.receipts).into_iter();
-        let (taken, kept) = all.partition(|receipt| is_wanted(receipt.asked));
+        let (taken, kept) = all.partition(|receipt| is_wanted(receipt.kind));
         self.receipts = kept;
         Vec::from(taken)
     }
@@ -119,7 +119,7 @@ impl Terrain {
         commit: Commit,
     ) -> Result<(Vec<Receipt>, DeferredDrop), StaleCommit> {
         let (mut receipts, dropped) = self.install(commit)?;
-        let others = receipts.extract_if(.., |receipt| receipt.asked != Asked::Edit);
+        let others = receipts.extract_if(.., |receipt| receipt.kind != OrderKind::Edit);
         others.for_each(|receipt| self.answer(receipt));
         if let Some(pending) = &mut self.pending_display {
             *pending = PendingDisplay::nothing(self.world.version());

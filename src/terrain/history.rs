@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::receipt::{Asked, Receipt, Rejection};
+use super::receipt::{OrderKind, Receipt, Rejection};
 use super::record::CommitRecord;
 use crate::lattice::LatticeBox;
 use crate::loose::LoosePiece;
@@ -23,10 +23,10 @@ pub(super) enum Step {
 
 impl Step {
     /// The step that an order takes, if it is one.
-    pub fn of(asked: Asked) -> Option<Self> {
-        match asked {
-            Asked::Undo => Some(Self::Undo),
-            Asked::Redo => Some(Self::Redo),
+    pub fn of(kind: OrderKind) -> Option<Self> {
+        match kind {
+            OrderKind::Undo => Some(Self::Undo),
+            OrderKind::Redo => Some(Self::Redo),
             _ => None,
         }
     }
@@ -34,8 +34,8 @@ impl Step {
     /// The receipt where there is nothing to do.
     pub fn nothing(self) -> Receipt {
         match self {
-            Self::Undo => Receipt::of(Asked::Undo, Err(Rejection::NothingToUndo)),
-            Self::Redo => Receipt::of(Asked::Redo, Err(Rejection::NothingToRedo)),
+            Self::Undo => Receipt::of(OrderKind::Undo, Err(Rejection::NothingToUndo)),
+            Self::Redo => Receipt::of(OrderKind::Redo, Err(Rejection::NothingToRedo)),
         }
     }
 }

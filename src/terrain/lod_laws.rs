@@ -258,7 +258,7 @@ fn where_levels_meet_vertices_are_not_each_their_own() {
 /// The bricks and words of the mask that a running transaction changes.
 fn overlay(world: &World, commit: &Commit) -> (Vec<(BrickPos, Arc<Brick>)>, Mask) {
     let (mut bricks, mut mask) = (BTreeMap::new(), Mask::default());
-    for change in commit.changes.iter().map(|own| &own.change) {
+    for change in commit.outcome.changes.iter().map(|own| &own.change) {
         for (pos, brick) in &change.patch.bricks {
             let pristine = || Arc::new(Brick::pristine(pristine_layers(world.ground(), *pos)));
             bricks.insert(*pos, brick.clone().unwrap_or_else(pristine));

@@ -3,20 +3,24 @@
 use std::collections::VecDeque;
 #[cfg(feature = "store")]
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::edit_settings::EditSettings;
 use super::order::Order;
 use super::queue::Submission;
 use super::receipt::Receipt;
-use super::record::{CommitRecord, LogEntry};
+use super::record::CommitRecord;
 use crate::world::{Patch, World, brick_bytes};
 
 /// A record as its transaction makes it: all but what only the commit knows.
 #[derive(Default)]
 pub(super) struct RecordDraft {
-    /// The settings of the first and of the last edit that was applied. Entries say how those in between differ.
+    /// The settings of the first and of the last edit that was applied. Orders set how those in between differ.
     edit_settings: Option<[EditSettings; 2]>,
-    entries: Vec<LogEntry>,
+    /// With room for the orders that are added when the record is entered.
+    orders: Vec<Order>,
+    /// Whether its order was a step through history or replaced parts: then the change is its only order.
+    is_parts: bool,
     change: Patch,
     /// Bytes that the record may hold alone.
     bytes: usize,
@@ -26,30 +30,31 @@ impl RecordDraft {
     /// The record of a commit, by the orders, their receipts, and what changes.
     pub fn new(submissions: &[Submission], receipts: &[Receipt], change: Patch) -> Self {
         // With room for the first settings, if those before were others.
-        let (mut edit_settings, mut entries) =
-            (None::<[EditSettings; 2]>, Vec::with_capacity(submissions.len() + 2));
+        let mut orders: Vec<Order> = Vec::with_capacity(submissions.len() + 2);
+        let (mut edit_settings, mut is_parts) = (None::<[EditSettings; 2]>, false);
         for (submission, receipt) in submissions.iter().zip(receipts) {
             let (Ok(order), Ok(_)) = (&submission.order, &receipt.outcome) else { continue };
-            if order.asked().is_logged_as_change() {
-                entries.push(LogEntry::Change);
+            if order.kind().is_logged_as_parts() {
+                // A transaction of its own, so there is no other order.
+                is_parts = true;
                 continue;
             }
             if let Order::Edit(_) = order {
                 let current = submission.edit_settings.clone();
                 let first = match edit_settings.take() {
                     Some([first, last]) => {
-                        entries.extend(current.orders_after(Some(&last)).map(LogEntry::Order));
+                        orders.extend(current.orders_after(Some(&last)));
                         first
                     }
                     None => current.clone(),
                 };
                 edit_settings = Some([first, current]);
             }
-            entries.push(LogEntry::Order(order.clone()));
+            orders.push(order.clone());
         }
-        let room = (entries.capacity() - entries.len()) * size_of::<LogEntry>();
-        let bytes = bytes_of(&entries, &change) + room;
-        Self { edit_settings, entries, change, bytes }
+        let room = (orders.capacity() - orders.len()) * size_of::<Order>();
+        let bytes = bytes_of(&orders, &change) + room;
+        Self { edit_settings, orders, is_parts, change, bytes }
     }
 
     /// What changes.
@@ -58,23 +63,26 @@ impl RecordDraft {
     }
 }
 
-/// Bytes that a record of these may hold alone. Looks at all samples of uniform bricks, so it is not for the main
-/// thread.
-fn bytes_of(entries: &[LogEntry], change: &Patch) -> usize {
-    let rules = entries.iter().map(rule_bytes);
+/// Bytes that a record of these may hold alone, its change once. Looks at all samples of uniform bricks, so it is not
+/// for the main thread.
+fn bytes_of(orders: &[Order], change: &Patch) -> usize {
+    let rules = orders.iter().map(rule_bytes);
     let bricks = change.bricks.iter().flat_map(|(_, brick)| brick).map(|brick| brick_bytes(brick));
     let fields = change.fields.iter().map(|(_, fields)| fields.bytes());
+    // The change is behind an `Arc`, with its two counters.
     size_of::<CommitRecord>()
-        + size_of_val(entries)
+        + 2 * size_of::<usize>()
+        + size_of::<Patch>()
+        + size_of_val(orders)
         + size_of_val(&change.bricks[..])
         + size_of_val(&change.fields[..])
         + rules.chain(bricks).chain(fields).sum::<usize>()
 }
 
-/// Bytes of the rules that an entry holds.
-fn rule_bytes(entry: &LogEntry) -> usize {
-    match entry {
-        LogEntry::Order(Order::Rules(Some(rules))) => rules.bytes(),
+/// Bytes of the rules that an order holds.
+fn rule_bytes(order: &Order) -> usize {
+    match order {
+        Order::Rules(Some(rules)) => rules.bytes(),
         _ => 0,
     }
 }
@@ -107,14 +115,17 @@ impl CommitLog {
 
     /// Records the commit that led to this world. Records that no longer fit are moved to `dropped`.
     pub fn enter(&mut self, world: &World, draft: RecordDraft, dropped: &mut Vec<CommitRecord>) {
-        let RecordDraft { edit_settings, mut entries, mut change, mut bytes } = draft;
-        change.next_field = world.next_field;
+        let RecordDraft { edit_settings, mut orders, is_parts, change, mut bytes } = draft;
+        let change = Arc::new(Patch { next_field: world.next_field, ..change });
+        if is_parts {
+            orders.push(Order::parts(Arc::clone(&change), Some(world.hash())));
+        }
         if let Some([first, last]) = edit_settings {
-            let changes = first.orders_after(self.edit_settings.as_ref()).map(LogEntry::Order);
-            drop(entries.splice(0..0, changes.inspect(|entry| bytes += rule_bytes(entry))));
+            let changes = first.orders_after(self.edit_settings.as_ref());
+            drop(orders.splice(0..0, changes.inspect(|order| bytes += rule_bytes(order))));
             self.edit_settings = Some(last);
         }
-        self.push(world, entries, change, bytes, dropped);
+        self.push(world, orders, change, bytes, dropped);
     }
 
     /// Records new settings, if they differ from the previous ones.
@@ -123,13 +134,12 @@ impl CommitLog {
         if self.has_gap && self.records.is_empty() {
             return;
         }
-        let orders = edit_settings.orders_after(self.edit_settings.as_ref());
-        let entries: Vec<LogEntry> = orders.map(LogEntry::Order).collect();
-        if !entries.is_empty() {
+        let orders: Vec<Order> = edit_settings.orders_after(self.edit_settings.as_ref()).collect();
+        if !orders.is_empty() {
             self.edit_settings = Some(edit_settings);
-            let change = Patch { next_field: world.next_field, ..Patch::default() };
-            let bytes = bytes_of(&entries, &change);
-            self.push(world, entries, change, bytes, &mut Vec::new());
+            let change = Arc::new(Patch { next_field: world.next_field, ..Patch::default() });
+            let bytes = bytes_of(&orders, &change);
+            self.push(world, orders, change, bytes, &mut Vec::new());
         }
     }
 
@@ -175,14 +185,14 @@ impl CommitLog {
     fn push(
         &mut self,
         world: &World,
-        entries: Vec<LogEntry>,
-        change: Patch,
+        orders: Vec<Order>,
+        change: Arc<Patch>,
         bytes: usize,
         dropped: &mut Vec<CommitRecord>,
     ) {
         let (number, revision, hash) = (self.next, world.revision(), world.hash());
         self.next += 1;
-        let record = CommitRecord { number, revision, hash, entries, change };
+        let record = CommitRecord { number, revision, hash, orders, change };
         let before = revision.saturating_sub(record.is_commit().into());
         self.since.get_or_insert((before, false)).1 |= record.sets_ground();
         self.records.push_back(record);

@@ -78,10 +78,10 @@ pub(crate) use queue::Together;
 pub use queue::WorkLimits;
 #[doc(hidden)]
 pub use receipt::ChunkScenario;
-pub use receipt::{Applied, Asked, Receipt, Rejection, ScenarioCounts};
+pub use receipt::{Applied, OrderKind, Receipt, Rejection, ScenarioCounts};
 #[doc(hidden)]
 pub use record::WorldParts;
-pub use record::{CommitRecord, LogEntry};
+pub use record::CommitRecord;
 #[doc(hidden)]
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]

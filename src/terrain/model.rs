@@ -212,7 +212,7 @@ impl Terrain {
                 self.log_settings();
                 return None;
             };
-            let step = orders.first().and_then(|first| Step::of(first.asked()));
+            let step = orders.first().and_then(|first| Step::of(first.kind()));
             let target = step.and_then(|step| self.undo_stack.next(step)).cloned();
             match step.filter(|_| target.is_none()) {
                 None => break (Work::Orders(orders, target), estimate),
@@ -278,7 +278,7 @@ impl Terrain {
             return Ok(Default::default());
         }
         let mut copy = commit.copy.take();
-        if let Some(whole) = commit.whole.take() {
+        if let Some(whole) = commit.outcome.whole.take() {
             copy = Some(std::mem::replace(&mut self.world, whole));
             self.drawn_cut = None;
             #[cfg(feature = "plugin")]
@@ -305,7 +305,7 @@ impl Terrain {
             self.undo_stack.clear(&mut dropped);
         }
         for replaced in installed.replaced {
-            match (order.and_then(|order| Step::of(order.asked())), done.work.target()) {
+            match (order.and_then(|order| Step::of(order.kind())), done.work.target()) {
                 (Some(step), Some(used)) => self.undo_stack.record_step(step, used, replaced, &mut dropped),
                 _ if replaces_parts => dropped.add(replaced),
                 _ => self.undo_stack.record(replaced, &mut dropped),

@@ -2,10 +2,8 @@
 
 use std::sync::Arc;
 
-use super::receipt::{Asked, Rejection};
-#[cfg(feature = "plugin")]
-use crate::brush::BrushError;
-use crate::brush::{Brush, Edit};
+use super::receipt::OrderKind;
+use crate::brush::{Brush, BrushError, Edit};
 use crate::edits::{EDIT_WORK, edit_work};
 use crate::ground::Ground;
 use crate::lattice::{ChunkGrid, LatticeBox};
@@ -60,16 +58,21 @@ impl Order {
         Self::Parts { change: change.into(), hash }
     }
 
+    /// Sets the rules of later edits; see [`Order::Rules`].
+    pub fn rules(rules: DiggingRules) -> Self {
+        Self::Rules(Some(Arc::new(rules)))
+    }
+
     /// The order's kind, as its receipt names it.
-    pub fn asked(&self) -> Asked {
+    pub fn kind(&self) -> OrderKind {
         match self {
-            Self::Edit(_) => Asked::Edit,
-            Self::Undo => Asked::Undo,
-            Self::Redo => Asked::Redo,
-            Self::Parts { .. } => Asked::Parts,
-            Self::Ground(_) => Asked::Ground,
-            Self::Rules(_) => Asked::Rules,
-            Self::Loose(_) => Asked::Loose,
+            Self::Edit(_) => OrderKind::Edit,
+            Self::Undo => OrderKind::Undo,
+            Self::Redo => OrderKind::Redo,
+            Self::Parts { .. } => OrderKind::Parts,
+            Self::Ground(_) => OrderKind::Ground,
+            Self::Rules(_) => OrderKind::Rules,
+            Self::Loose(_) => OrderKind::Loose,
         }
     }
 
@@ -118,14 +121,23 @@ impl Order {
 pub struct Request {
     pub(super) tag: u64,
     pub(super) stroke: Option<u64>,
-    pub(super) order: Result<Order, Rejection>,
+    pub(super) order: Result<Order, BrushError>,
 }
 
 impl Request {
     /// A brush whose edit was made elsewhere.
     #[cfg(feature = "plugin")]
     pub(crate) fn of_edit(brush: &Brush, edit: Result<Edit, BrushError>) -> Self {
-        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit).map_err(Rejection::from) }
+        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit) }
+    }
+
+    /// The order.
+    ///
+    /// # Errors
+    /// When its brush or edit is invalid.
+    #[cfg(feature = "net")]
+    pub(crate) fn into_order(self) -> Result<Order, BrushError> {
+        self.order
     }
 
     /// The request's work, in bricks.
@@ -134,22 +146,22 @@ impl Request {
     }
 
     /// The kind of its order. Only edits are invalid.
-    pub(super) fn asked(&self) -> Asked {
-        self.order.as_ref().map_or(Asked::Edit, Order::asked)
+    pub(super) fn kind(&self) -> OrderKind {
+        self.order.as_ref().map_or(OrderKind::Edit, Order::kind)
     }
 }
 
 impl From<&Brush> for Request {
     fn from(brush: &Brush) -> Self {
         let edit = Edit::quantize(brush);
-        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit).map_err(Rejection::from) }
+        Self { tag: brush.tag, stroke: brush.stroke, order: edit.map(Order::Edit) }
     }
 }
 
 impl From<Edit> for Request {
     fn from(edit: Edit) -> Self {
         let (tag, stroke) = (edit.tag(), edit.stroke());
-        Self { tag, stroke, order: edit.check().map(|()| Order::Edit(edit)).map_err(Rejection::from) }
+        Self { tag, stroke, order: edit.check().map(|()| Order::Edit(edit)) }
     }
 }
 

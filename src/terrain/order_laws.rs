@@ -13,7 +13,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::queue::Together;
 use super::run::PANICS;
 use super::{
-    Asked, LooseSettings, Order, Receipt, Rejection, Request, Terrain, TerrainSettings, Transaction,
+    LooseSettings, Order, OrderKind, Receipt, Rejection, Request, Terrain, TerrainSettings, Transaction,
     WorkLimits, unique,
 };
 use crate::brush::{Brush, Edit};
@@ -26,7 +26,7 @@ use crate::worlds;
 enum Ask {
     /// A brush, sent in a frame.
     Brush(Brush, usize),
-    Step(Asked),
+    Step(OrderKind),
     Rules(DiggingRules),
     Loose(Option<LooseSettings>),
 }
@@ -35,8 +35,8 @@ fn script(rng: &mut Rng, ground: &Ground) -> Vec<Ask> {
     let (mut frame, mut stroke) = (0, 0);
     let count = rng.u64(4..24);
     let ask = |tag: u64| match rng.u32(0..20) {
-        0..=2 => Ask::Step(Asked::Undo),
-        3 => Ask::Step(Asked::Redo),
+        0..=2 => Ask::Step(OrderKind::Undo),
+        3 => Ask::Step(OrderKind::Redo),
         4 => Ask::Rules(if rng.bool() { worlds::random_rules(rng, ground) } else { DiggingRules::default() }),
         5 => {
             let settings = LooseSettings { largest: 3000, crumbs: 6, debris: 400 };
@@ -62,8 +62,8 @@ fn script(rng: &mut Rng, ground: &Ground) -> Vec<Ask> {
     (1..=count).map(ask).collect()
 }
 
-fn order_of(step: Asked) -> Order {
-    if step == Asked::Undo { Order::Undo } else { Order::Redo }
+fn order_of(step: OrderKind) -> Order {
+    if step == OrderKind::Undo { Order::Undo } else { Order::Redo }
 }
 
 /// A script in short: what was sent in which frame, of which stroke.
@@ -93,7 +93,7 @@ struct Said {
 impl Said {
     fn hear(&mut self, receipts: Vec<Receipt>) {
         for receipt in receipts {
-            if receipt.asked != Asked::Edit {
+            if receipt.kind != OrderKind::Edit {
                 self.steps.push(receipt);
                 continue;
             }
@@ -224,7 +224,7 @@ fn by_the_book(mut terrain: Terrain, script: &[Ask]) -> (BTreeMap<u64, Receipt>,
             Ask::Step(step) => {
                 open = None;
                 let (from, to) = match step {
-                    Asked::Undo => (&mut past, &mut future),
+                    OrderKind::Undo => (&mut past, &mut future),
                     _ => (&mut future, &mut past),
                 };
                 let group = from.pop();

@@ -67,7 +67,7 @@ impl PendingDisplay {
         let chunks = commit.kept.chunks.iter().map(|(chunk, _)| MeshKey::Chunk(*chunk));
         let mut boxes = BTreeMap::new();
         commit.add_changed_boxes(&mut boxes);
-        let (drawn, fields) = (tiles.chain(chunks).collect(), commit.news.clone());
+        let (drawn, fields) = (tiles.chain(chunks).collect(), commit.outcome.news.clone());
         Self { from: before, to: before, drawn, fields, boxes }
     }
 

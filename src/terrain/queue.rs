@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::edit_settings::EditSettings;
 use super::order::{Order, Request};
-use super::receipt::{Asked, Rejection};
+use super::receipt::{OrderKind, Rejection};
 use crate::brush::Edit;
 
 /// Limits of a terrain's work, in bricks of 8x8x8 samples that edits may reach: see [`Terrain::set_work_limits`].
@@ -69,8 +69,8 @@ impl Submission {
     }
 
     /// The kind of its order.
-    pub(super) fn asked(&self) -> Asked {
-        self.order.as_ref().map_or(Asked::Edit, Order::asked)
+    pub(super) fn kind(&self) -> OrderKind {
+        self.order.as_ref().map_or(OrderKind::Edit, Order::kind)
     }
 
     /// Returns `true` if it belongs to the same group, under the same rules and loose settings.
@@ -99,7 +99,7 @@ impl Queue {
     /// Queues an order of this much work. An edit joins the group of the one before it if both belong `together`; edits
     /// after any other order begin a new group.
     pub fn push(&mut self, request: Request, work: u64, together: Together, edit_settings: EditSettings) {
-        let is_edit = request.asked() == Asked::Edit;
+        let is_edit = request.kind() == OrderKind::Edit;
         let together = request.stroke.map_or(together, Together::Stroke);
         let group = match self.open {
             Some((open, group)) if open == together => group,
@@ -109,6 +109,7 @@ impl Queue {
         self.open = is_edit.then_some((together, group));
         self.work += work;
         let Request { tag, order, .. } = request;
+        let order = order.map_err(Rejection::from);
         self.submissions.push_back(Submission { tag, order, group, edit_settings, work });
     }
 

@@ -14,7 +14,7 @@ use crate::volume::{FieldId, MaterialCounts, Refused, RulesError, Scenario};
 #[cfg_attr(feature = "plugin", derive(bevy::reflect::Reflect), reflect(opaque, Clone, Debug, PartialEq))]
 pub struct Receipt {
     /// The kind of order.
-    pub asked: Asked,
+    pub kind: OrderKind,
     /// The tag of the brush; 0 for everything else.
     pub tag: u64,
     /// What it changed, or why it was rejected.
@@ -24,12 +24,12 @@ pub struct Receipt {
 impl Receipt {
     /// The receipt of an edit.
     pub fn of_edit(tag: u64, outcome: Result<Applied, Rejection>) -> Self {
-        Self { asked: Asked::Edit, tag, outcome }
+        Self { kind: OrderKind::Edit, tag, outcome }
     }
 
     /// The receipt of anything else.
-    pub fn of(asked: Asked, outcome: Result<Applied, Rejection>) -> Self {
-        Self { asked, tag: 0, outcome }
+    pub fn of(kind: OrderKind, outcome: Result<Applied, Rejection>) -> Self {
+        Self { kind, tag: 0, outcome }
     }
 
     /// Whether the order failed for a reason that other machines may not have.
@@ -43,7 +43,7 @@ impl Receipt {
 /// The kinds of [orders](super::Order), as receipts name them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Asked {
+pub enum OrderKind {
     /// An edit.
     Edit,
     /// An undo.
@@ -60,7 +60,7 @@ pub enum Asked {
     Loose,
 }
 
-impl fmt::Display for Asked {
+impl fmt::Display for OrderKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Edit => "edit",
@@ -74,14 +74,14 @@ impl fmt::Display for Asked {
     }
 }
 
-impl Asked {
+impl OrderKind {
     /// Whether it is a step through history.
     pub fn is_step(self) -> bool {
         matches!(self, Self::Undo | Self::Redo)
     }
 
-    /// Whether logs hold it as a change of parts, and not as an order.
-    pub(crate) fn is_logged_as_change(self) -> bool {
+    /// Whether logs hold it as the parts that it changed.
+    pub(crate) fn is_logged_as_parts(self) -> bool {
         matches!(self, Self::Undo | Self::Redo | Self::Parts)
     }
 

@@ -1,30 +1,13 @@
-//! Records of the commit log: the requests of each commit, and its changes of the world.
+//! Records of the commit log: the orders of each commit, and its changes of the world.
 
 use std::sync::Arc;
 
 use super::edit_settings::EditSettings;
 use super::order::Order;
+use super::receipt::OrderKind;
 use crate::world::Patch;
 
-/// One item of a commit. Items of one commit apply in order.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum LogEntry {
-    /// An order that was carried out, under the rules and settings of the orders before it: an edit, another ground, or
-    /// rules and settings for what follows.
-    Order(Order),
-    /// A step through history, or replaced parts: the record's [change](CommitRecord::change) contains them.
-    Change,
-}
-
-impl LogEntry {
-    /// Whether it changes the world, and not only what later edits obey.
-    fn is_commit(&self) -> bool {
-        !matches!(self, Self::Order(order) if order.asked().is_setting())
-    }
-}
-
-/// A commit: the requests and their results.
+/// A commit: the orders that were carried out, and what they changed.
 #[derive(Clone, Debug)]
 pub struct CommitRecord {
     /// The commit's number in the log that it was taken from: one more than that of the record before. A log whose
@@ -35,43 +18,29 @@ pub struct CommitRecord {
     pub revision: u64,
     /// The world's [hash](super::World::hash) after it.
     pub hash: u64,
-    /// The items of the commit, in order. Rejected edits are left out; a commit of such edits alone has no entry.
-    pub entries: Vec<LogEntry>,
+    /// The orders of the commit, in order. A step through history is recorded as the parts that it restored:
+    /// [`Order::Parts`] with the [change](Self::change) and the [hash](Self::hash) of this record. Rejected orders are
+    /// left out; a commit of such orders alone has none.
+    pub orders: Vec<Order>,
     /// What changed.
-    pub change: Patch,
+    pub change: Arc<Patch>,
 }
 
 impl CommitRecord {
     /// Whether it is a commit. Otherwise it only holds rules and settings for later edits, and the revision does not
     /// change.
     pub fn is_commit(&self) -> bool {
-        self.entries.is_empty() || self.entries.iter().any(LogEntry::is_commit)
+        self.orders.is_empty() || self.orders.iter().any(|order| !order.kind().is_setting())
     }
 
     /// Whether it sets another ground.
     pub(super) fn sets_ground(&self) -> bool {
-        self.entries.iter().any(|entry| matches!(entry, LogEntry::Order(Order::Ground(_))))
+        self.orders.iter().any(|order| order.kind() == OrderKind::Ground)
     }
 
     /// Whether its [change](Self::change) counts: a step through history or replaced parts. Edits lead to theirs again.
     pub fn has_change(&self) -> bool {
-        let is_change = |entry: &LogEntry| match entry {
-            LogEntry::Change => true,
-            LogEntry::Order(order) => order.asked().is_logged_as_change(),
-        };
-        self.entries.iter().any(is_change)
-    }
-
-    /// The orders that it was made of. Its change stands for steps through history; without any entry, all of its edits
-    /// were rejected.
-    pub(crate) fn orders(&self) -> impl Iterator<Item = Order> {
-        let hash = Some(self.hash);
-        let nothing = self.entries.is_empty().then(|| Order::Parts { change: Arc::default(), hash });
-        let order = move |entry: &LogEntry| match entry {
-            LogEntry::Order(order) => order.clone(),
-            LogEntry::Change => Order::Parts { change: Arc::new(self.change.clone()), hash },
-        };
-        self.entries.iter().map(order).chain(nothing)
+        self.orders.iter().any(|order| order.kind().is_logged_as_parts())
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::edit_settings::EditSettings;
 use super::model::Terrain;
+use super::order::Order;
 use super::parts_error::PartsError;
 use super::queue::WorkLimits;
 use super::receipt::{Receipt, Rejection};
@@ -12,7 +13,7 @@ use super::record::{CommitRecord, WorldParts};
 use super::resolve::world_of;
 use crate::ground::Ground;
 use crate::volume::RulesError;
-use crate::world::{TerrainError, TerrainSettings, World};
+use crate::world::{Patch, TerrainError, TerrainSettings, World};
 
 /// An error of restoring a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -159,7 +160,10 @@ impl Terrain {
     }
 
     fn replay_orders(&mut self, record: &CommitRecord) -> Result<Vec<Receipt>, ReplayError> {
-        let receipts = self.apply(record.orders());
+        // All of its orders were rejected: a commit that changes nothing.
+        let nothing = [Order::parts(Patch::default(), Some(record.hash))];
+        let orders = if record.orders.is_empty() { &nothing[..] } else { &record.orders[..] };
+        let receipts = self.apply(orders);
         match receipts.iter().find_map(|receipt| receipt.outcome.as_ref().err()) {
             None => Ok(receipts),
             Some(why) => Err(ReplayError::of(why, record.revision)),

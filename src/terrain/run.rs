@@ -76,14 +76,14 @@ impl Transaction {
         // A large one runs on a thread of the pool: entering the pool for each stage would take longer.
         let mut resolved = if self.is_large() { rayon::scope(|_| run()) } else { run() };
         // Terrain and transaction hold the world. If others do too, the commit changes a copy, which is made here.
-        let is_changed = !self.work.is_cut() && resolved.whole.is_none();
+        let is_changed = !self.work.is_cut() && resolved.outcome.whole.is_none();
         let is_shared = Arc::strong_count(&self.world) > 2 && is_changed;
         let copy = || is_shared.then(|| Arc::new(World::clone(&self.world)));
         let copy = Stages::time(&mut resolved.stages.whole, copy);
         let commit = self.commit(resolved);
         let record = self
             .is_logged
-            .then(|| RecordDraft::new(self.work.submissions(), &commit.receipts, commit.change()));
+            .then(|| RecordDraft::new(self.work.submissions(), &commit.outcome.receipts, commit.change()));
         Commit { copy, record, ..commit }
     }
 
@@ -151,12 +151,13 @@ impl Transaction {
     /// The commit that changes nothing and rejects all orders.
     pub(super) fn rejected(&self) -> Commit {
         let rejected = |own: &Submission| Receipt {
-            asked: own.asked(),
+            kind: own.kind(),
             tag: own.tag,
             outcome: Err(own.order.as_ref().err().cloned().unwrap_or(Rejection::Panicked)),
         };
-        let receipts = self.work.submissions().iter().map(rejected).collect();
-        self.commit(Resolved { receipts, ..Resolved::nothing(&self.world) })
+        let mut resolved = Resolved::nothing(&self.world);
+        resolved.outcome.receipts = self.work.submissions().iter().map(rejected).collect();
+        self.commit(resolved)
     }
 }
 

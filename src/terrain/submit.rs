@@ -44,13 +44,13 @@ impl Terrain {
         let together = Together::Batch(unique());
         for order in orders {
             let request = order.into();
-            let (asked, tag) = (request.asked(), request.tag);
+            let (kind, tag) = (request.kind(), request.tag);
             let outcome = match self.admit(&request) {
                 Ok(work) => self.queue_order(request, work, together),
                 Err(full) => Err(full),
             };
             if let Err(why) = outcome {
-                self.answer(Receipt { asked, tag, outcome: Err(why) });
+                self.answer(Receipt { kind, tag, outcome: Err(why) });
             }
         }
     }
@@ -61,7 +61,7 @@ impl Terrain {
     /// # Errors
     /// When there is no room.
     pub(crate) fn admit(&self, request: &Request) -> Result<u64, Rejection> {
-        if request.asked().is_setting() {
+        if request.kind().is_setting() {
             return Ok(0);
         }
         let work = request.work(self.world.grid());
@@ -121,10 +121,10 @@ impl Terrain {
         let mut invalid = Vec::new();
         for order in orders {
             let request = order.into();
-            let asked = request.asked();
+            let kind = request.kind();
             let work = request.work(self.world.grid());
             let outcome = self.queue_order(request, work, together);
-            invalid.extend(outcome.err().map(|why| Receipt::of(asked, Err(why))));
+            invalid.extend(outcome.err().map(|why| Receipt::of(kind, Err(why))));
         }
         let mut receipts = self.finish();
         let mut own = receipts.split_off(waiting.min(receipts.len()));
@@ -136,9 +136,9 @@ impl Terrain {
     /// Carries out one order at once, like [`apply`](Self::apply).
     pub fn apply_one(&mut self, order: impl Into<Request>) -> Receipt {
         let request = order.into();
-        let asked = request.asked();
+        let kind = request.kind();
         // Valid rules and settings of loose pieces have none.
-        self.apply([request]).pop().unwrap_or_else(|| Receipt::of(asked, Ok(Applied::default())))
+        self.apply([request]).pop().unwrap_or_else(|| Receipt::of(kind, Ok(Applied::default())))
     }
 
     /// Undoes the last group of edits at once, after everything that waits; see [`Order::Undo`].

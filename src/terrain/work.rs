@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::history::UndoDelta;
 use super::queue::Submission;
-use super::receipt::Asked;
+use super::receipt::OrderKind;
 use crate::redraw::ChooseCut;
 
 /// The work of a transaction.
@@ -29,7 +29,7 @@ impl Work {
 
     /// The edits and rejected edits among the orders.
     pub fn edits(&self) -> impl Iterator<Item = &Submission> {
-        self.submissions().iter().filter(|own| own.asked() == Asked::Edit)
+        self.submissions().iter().filter(|own| own.kind() == OrderKind::Edit)
     }
 
     /// The content that a step through history restores.

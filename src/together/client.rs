@@ -16,7 +16,7 @@ use super::shared::{EditOutcome, GroundEdited, GroundJoined, SharedTerrain};
 use super::sharing::Sharing;
 use crate::net::{Client, ClientEvent, KickReason, Lane, Refusal};
 use crate::plugin::{BrushApplied, EditOutbox, Held, HistoryMoved, LoosePieceFound, LoosePieceReturned};
-use crate::terrain::{Applied, Asked, Order, Receipt, Rejection, Terrain};
+use crate::terrain::{Applied, Order, OrderKind, Receipt, Rejection, Terrain};
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// The writers of messages about edits.
@@ -317,14 +317,14 @@ impl EditMessages<'_> {
             _ => Rejection::NothingToRedo,
         };
         link.into_iter().for_each(|link| link.undos = link.undos.saturating_sub(1));
-        self.stepped(terrain, request.asked(), Err(why));
+        self.stepped(terrain, request.kind(), Err(why));
     }
 
     /// Answers what waits, and drops the link.
     fn close(&mut self, terrain: Entity, link: Option<Link>, messages: &mut MessageWriter<FromPlayer>) {
         let Some(link) = link else { return };
         link.tags.iter().for_each(|tag| self.refused(terrain, *tag, None));
-        (0..link.undos).for_each(|_| self.stepped(terrain, Asked::Undo, Err(Rejection::Refused)));
+        (0..link.undos).for_each(|_| self.stepped(terrain, OrderKind::Undo, Err(Rejection::Refused)));
         if link.greeted.is_some() {
             messages.write(FromPlayer::Left(link.run));
         }
@@ -338,7 +338,7 @@ impl EditMessages<'_> {
         self.edited.write(GroundEdited { terrain, tag, outcome: EditOutcome::Refused(why) });
     }
 
-    fn stepped(&mut self, terrain: Entity, step: Asked, outcome: Result<Applied, Rejection>) {
+    fn stepped(&mut self, terrain: Entity, step: OrderKind, outcome: Result<Applied, Rejection>) {
         self.moved.write(HistoryMoved { terrain: Some(terrain), receipt: Receipt::of(step, outcome) });
     }
 
@@ -376,11 +376,11 @@ impl EditMessages<'_> {
                 if let Some(why) = why.filter(|why| *why != Refusal::Nothing) {
                     self.warn(terrain, SharingError::UndoRefused(why));
                 }
-                self.stepped(terrain, Asked::Undo, Err(outcome));
+                self.stepped(terrain, OrderKind::Undo, Err(outcome));
             }
             ClientEvent::Undone(restored) => {
                 link.undos = link.undos.saturating_sub(1);
-                self.stepped(terrain, Asked::Undo, Ok(restored.unwrap_or_default()));
+                self.stepped(terrain, OrderKind::Undo, Ok(restored.unwrap_or_default()));
             }
             event => {
                 link.is_playable |= event == ClientEvent::Playable;

@@ -47,8 +47,8 @@ pub enum SharingError {
     NoTerrain,
     /// The rules of the terrain were changed, which has no effect: rules come from the server.
     #[error(
-        "rules that are set on a shared terrain do nothing; set them on the server, with \
-         GroundServer::with(|server| server.set_rules(rules))"
+        "rules that are set on a shared terrain do nothing; set them on the server: call \
+         `server.submit(Order::rules(rules))` in `GroundServer::with`"
     )]
     RulesIgnored,
     /// The server does not undo the player's last stroke.

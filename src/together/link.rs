@@ -10,7 +10,7 @@ use super::messages::GroundId;
 use super::service::Service;
 use crate::net::{self, Client, ContentTable, KickReason, Lane};
 use crate::plugin::{LoosePieceFound, LoosePieceReturned};
-use crate::terrain::{Asked, Order, Terrain, TerrainError, TerrainSettings, Version, World};
+use crate::terrain::{Order, OrderKind, Terrain, TerrainError, TerrainSettings, Version, World};
 use crate::threads::{ThreadTask, Threads};
 use crate::volume::DiggingRules;
 
@@ -216,8 +216,8 @@ impl Standing {
 }
 
 /// Whether an order is a change of what is shown, which only the link submits.
-fn is_change(asked: Asked) -> bool {
-    matches!(asked, Asked::Parts | Asked::Ground)
+fn is_change(kind: OrderKind) -> bool {
+    matches!(kind, OrderKind::Parts | OrderKind::Ground)
 }
 
 impl Display {
@@ -226,7 +226,7 @@ impl Display {
         drop(terrain.take_receipts_of(is_change));
         Self {
             version: terrain.world().version(),
-            submitted: terrain.unanswered().filter(|(asked, _)| is_change(*asked)).count() as u64,
+            submitted: terrain.unanswered().filter(|(kind, _)| is_change(*kind)).count() as u64,
             answered: 0,
             is_broken: false,
             whole: None,

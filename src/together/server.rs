@@ -133,7 +133,7 @@ impl GroundServer {
     }
 
     /// Calls a function with the server as soon as it is not busy, in the order of these calls: for example to set a
-    /// player's position or the rules.
+    /// player's position, or to [submit](Server::submit) orders.
     pub fn with(&mut self, work: impl FnOnce(&mut Server) + Send + Sync + 'static) {
         self.ask(move |parts, _| work(&mut parts.server));
     }

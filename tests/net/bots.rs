@@ -408,11 +408,12 @@ impl Play {
             } else {
                 DiggingRules::default()
             };
-            self.server.set_rules(rules).expect("valid rules");
+            self.server.submit(Order::rules(rules)).expect("valid rules");
         }
         if self.changes_rules && self.frame % 240 == 120 {
             let loose = LooseSettings { largest: 4000, crumbs: 9, debris: self.rng.u32(0..4000) };
-            self.server.set_loose((self.rng.u32(0..4) > 0).then_some(loose));
+            let loose = (self.rng.u32(0..4) > 0).then_some(loose);
+            self.server.submit(Order::Loose(loose)).expect("it can be shared");
         }
         for bot in &mut self.bots {
             while let Some((at, message)) = bot.up.next(self.now) {
@@ -490,7 +491,7 @@ impl Play {
                 break;
             }
         }
-        // Waits until marks have arrived and are compared.
+        // Waits until hash checks have arrived and are compared.
         self.seconds(3.0);
         let hash = self.server.terrain().world().hash();
         for bot in self.bots.iter().filter(|bot| bot.is_connected) {

@@ -92,12 +92,12 @@ fn paths_roads_and_grids_reach_everybody() {
     let grid = ShapeGrid::from_fn(UVec3::splat(40), |at| (at - 20).as_vec3().length() - 15.5).expect("valid");
     let shape = |x: f32| GridShape::new(grid.clone(), Vec3::new(x, 2.0, 70.0)).with_scale(0.5);
     let edit = |x: f32| Edit::quantize(&Brush::dig(shape(x))).expect("valid");
-    assert!(server.edit(edit(50.0)).is_err(), "nobody can get it");
+    assert!(server.submit(edit(50.0)).is_err(), "nobody can get it");
     server.contents_mut().add(Arc::clone(grid.image()));
     let sent = |server: &Server| server.figures().bulk_bytes;
     let before = sent(&server);
     for x in [50.0, 56.0, 30.0] {
-        server.edit(edit(x)).expect("it is in the list");
+        server.submit(edit(x)).expect("it is in the list");
         (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
         assert_eq!(client.world().hash(), server.terrain().world().hash());
     }
@@ -135,12 +135,12 @@ fn a_paste_within_a_grid_reaches_everybody() {
         Edit::quantize(&Brush { operation, ..Brush::dig(within) }).expect("valid")
     };
     let at = Vec3::new(60.0, 8.0, 60.0);
-    assert!(server.edit(paste(at)).is_err(), "nobody can get it");
+    assert!(server.submit(paste(at)).is_err(), "nobody can get it");
     server.contents_mut().add(Arc::clone(grid.image()));
-    assert!(server.edit(paste(at)).is_err(), "nobody can get the prefab");
+    assert!(server.submit(paste(at)).is_err(), "nobody can get the prefab");
     assert!(server.contents_mut().add_prefab(Arc::clone(&prefab)).is_some());
     let before = server.terrain().world().hash();
-    server.edit(paste(at)).expect("both are in the list");
+    server.submit(paste(at)).expect("both are in the list");
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert_ne!(server.terrain().world().hash(), before);
     assert_eq!(client.world().hash(), server.terrain().world().hash());
@@ -160,7 +160,7 @@ fn the_largest_grid_with_materials_reaches_everybody() {
     assert!(grid.has_materials());
     server.contents_mut().add(Arc::clone(grid.image()));
     let within = GridShape::new(grid, Vec3::new(60.0, 8.0, 60.0)).with_scale(0.25);
-    server.edit(Edit::quantize(&Brush::fill(within, 0.0)).expect("valid")).expect("it is in the list");
+    server.submit(Brush::fill(within, 0.0)).expect("it is in the list");
     let before = server.terrain().world().hash();
     (0..1000).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert_ne!(server.terrain().world().hash(), before);

@@ -54,7 +54,7 @@ pub struct Follower {
     pub epoch: Option<Epoch>,
     /// The number of the last applied entry.
     pub number: u64,
-    /// The number that the last welcome led to. Marks up to it were compared with others.
+    /// The number that the last welcome led to. Hash checks up to it were compared with others.
     joined_at: u64,
     pub last_sequence: u64,
     pub position: IVec3,
@@ -70,8 +70,8 @@ pub struct Follower {
     regions: Vec<RegionContent>,
     table: Option<Box<RuleState>>,
     touched: BTreeSet<RegionPos>,
-    /// Hashes of the regions touched before each mark, until the server's hashes arrive.
-    marks: BTreeMap<u64, BTreeMap<RegionPos, u64>>,
+    /// Hashes of the regions touched before each hash check, until the server's hashes arrive.
+    hash_checks: BTreeMap<u64, BTreeMap<RegionPos, u64>>,
     hashes: VecDeque<(u64, RegionHashes)>,
     bulk: BulkReader,
     bulk_told: u64,
@@ -108,7 +108,7 @@ impl Follower {
             regions: Vec::new(),
             table: None,
             touched: BTreeSet::new(),
-            marks: BTreeMap::new(),
+            hash_checks: BTreeMap::new(),
             hashes: VecDeque::new(),
             bulk: BulkReader::default(),
             bulk_told: 0,
@@ -203,7 +203,7 @@ impl Follower {
         self.epoch = Some(welcome.epoch);
         self.joined_at = welcome.epoch.number;
         self.waiting.clear();
-        self.marks.clear();
+        self.hash_checks.clear();
         self.hashes.clear();
         self.touched.clear();
         self.awaited.clear();
@@ -305,7 +305,7 @@ impl Follower {
                 let world = self.terrain.world();
                 let touched = std::mem::take(&mut self.touched).into_iter();
                 let hashes = touched.map(|at| (at, region_hash(world, at))).collect();
-                self.marks.insert(self.number, hashes);
+                self.hash_checks.insert(self.number, hashes);
             }
             other => panic!("unknown: {other:?}"),
         }
@@ -320,19 +320,19 @@ impl Follower {
         }
     }
 
-    /// Compares the hashes that it recorded at marks with those of the server.
+    /// Compares the hashes that it recorded at hash checks with those of the server.
     fn check_hashes(&mut self) {
         while let Some((number, hashes)) = self.hashes.front() {
             if *number > self.number {
                 return;
             }
-            let noted = self.marks.remove(number).unwrap_or_default();
+            let noted = self.hash_checks.remove(number).unwrap_or_default();
             let told: BTreeMap<RegionPos, u64> = hashes.iter().copied().collect();
             let world = self.terrain.world();
-            // A region that was touched before the hashes arrived and again since the mark is compared at the next
-            // mark.
+            // A region that was touched before the hashes arrived and again since the hash check is compared at the
+            // next.
             let later: BTreeSet<RegionPos> =
-                self.marks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
+                self.hash_checks.values().flat_map(BTreeMap::keys).chain(&self.touched).copied().collect();
             let own = |at: &RegionPos| match noted.get(at) {
                 None if later.contains(at) => None,
                 None => Some(region_hash(world, *at)),

@@ -111,8 +111,8 @@ impl Messages {
                 bots[0].undo(2);
             }
             match round % 20 {
-                5 => server.set_rules(DiggingRules::default().with_bedrock(3)).unwrap(),
-                9 => server.set_loose(Some(LooseSettings::default())),
+                5 => server.submit(Order::rules(DiggingRules::default().with_bedrock(3))).unwrap(),
+                9 => server.submit(Order::Loose(Some(LooseSettings::default()))).unwrap(),
                 13 => bots[0].spoil(Vec3::new(64.0, 20.0, 64.0)),
                 _ => {}
             }

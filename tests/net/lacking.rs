@@ -66,7 +66,8 @@ fn who_lacks_whatever_has_the_world_of_the_server_in_the_end() {
         let mut play = Play::new(&ground, settings);
         let known = some(rng, &images);
         play.server.contents_mut().add_all(&known);
-        play.server.set_loose(Some(LooseSettings { largest: 4000, crumbs: 20, debris: 3000 }));
+        let loose = LooseSettings { largest: 4000, crumbs: 20, debris: 3000 };
+        play.server.submit(Order::Loose(Some(loose))).expect("it can be shared");
         let join = |play: &mut Play, rng: &mut Rng, id: u64| {
             let table = some(rng, &images);
             play.join_with(id, table, Some(terrain(&ground)))

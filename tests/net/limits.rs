@@ -68,7 +68,7 @@ fn held_beside(clients: u64, frames: u32) -> (i64, i64) {
         let (x, z) = (12.0 + (turn * 37 % 104) as f32, 12.0 + (turn * 53 % 104) as f32);
         let shape = Shape::sphere(Vec3::new(x, 14.0, z), 14.0);
         let brush = if turn % 3 == 0 { Brush::add(shape, MaterialId(1)) } else { Brush::dig(shape) };
-        server.edit(edit(&brush)).expect("no stamp");
+        server.submit(edit(&brush)).expect("no stamp");
         now += FRAME;
         server.advance(now);
         drop(server.take_outgoing());
@@ -106,7 +106,7 @@ fn who_stops_for_long_while_it_joins_begins_again_and_gets_the_world() {
     assert!(!play.players[at].client.has_joined());
     play.players[at].is_connected = false;
     for turn in 0..400 {
-        play.server.edit(edit(&ball(20.0 + (turn % 200) as f32, 100.0, 5.0))).expect("no stamp");
+        play.server.submit(edit(&ball(20.0 + (turn % 200) as f32, 100.0, 5.0))).expect("no stamp");
         play.frames(1);
     }
     assert_eq!(play.server.figures().stuck, 1);
@@ -260,7 +260,7 @@ fn games_keys_are_not_those_of_the_server() {
             Store::create_in(disk.clone(), &mut saved, StoreOptions::default()).expect("a new world");
         let mut server = Server::open(saved, &store, ServerSettings::default());
         for turn in 0..5 {
-            server.edit(edit(&ball(10.0 + 8.0 * turn as f32, 30.0, 3.0))).expect("no stamp");
+            server.submit(edit(&ball(10.0 + 8.0 * turn as f32, 30.0, 3.0))).expect("no stamp");
             server.advance(BEGIN);
             server.save(&mut store).expect("the thread runs");
         }
@@ -357,7 +357,7 @@ fn the_main_lane_keeps_within_its_window() {
     let (mut silent, mut longest) = (0, 0);
     for part in bricks.chunks(bricks.len() / 6) {
         let change = Patch { bricks: part.to_vec(), ..Patch::default() };
-        play.server.put(change).expect("it is below the limit of a message");
+        play.server.submit(Order::parts(change, None)).expect("it is below the limit of a message");
     }
     for _ in 0..100 {
         play.now += FRAME;

@@ -128,14 +128,17 @@ fn after_a_restart_clients_get_what_they_miss_as_entries() {
     for kill in [false, true] {
         let mut scene = Scene::new();
         let [mut a, mut b, mut away] = scene.join_all();
-        scene.server.set_rules(DiggingRules::default().with_unbreakable(MaterialId(9))).expect("valid");
+        scene
+            .server
+            .submit(Order::rules(DiggingRules::default().with_unbreakable(MaterialId(9))))
+            .expect("valid");
         scene.dig(&mut [&mut a, &mut b, &mut away], 0..5);
         scene.play(&mut [&mut a, &mut b, &mut away], 40);
         // This one misses digs, an undo, and settings.
         scene.server.disconnect(away.id);
         scene.dig(&mut [&mut a, &mut b], 5..60);
         a.undo(1);
-        scene.server.set_loose(Some(LooseSettings::default()));
+        scene.server.submit(Order::Loose(Some(LooseSettings::default()))).expect("it can be shared");
         scene.play(&mut [&mut a, &mut b], 40);
         agreed(&scene.server, &[&a, &b]);
         let before = scene.server.epoch();
@@ -274,7 +277,7 @@ fn a_server_that_lacks_content_of_saved_entries_sends_regions() {
         let at = Vec3::new(60.0, 20.0, 60.0);
         let stamp = Stamp::new(Arc::clone(&image), at, Vec2::splat(9.0), 3.0);
         let edit = Edit::quantize(&Brush::stamp(Shape::sphere(at, 6.0), stamp)).expect("a valid brush");
-        scene.server.edit(edit).expect("its image is known");
+        scene.server.submit(edit).expect("its image is known");
         scene.play(&mut [], 3);
         scene.restart(|disk| disk);
         if knows {
@@ -427,7 +430,8 @@ fn damaged_and_cut_journals_never_give_another_world() {
                     here[0].undo(id);
                 }
                 if rng.u32(0..8) == 0 {
-                    scene.server.set_loose(rng.bool().then(LooseSettings::default));
+                    let loose = rng.bool().then(LooseSettings::default);
+                    scene.server.submit(Order::Loose(loose)).expect("it can be shared");
                 }
                 if rng.u32(0..6) == 0 {
                     scene.store().checkpoint().expect("the disk works");

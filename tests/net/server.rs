@@ -6,11 +6,12 @@ use std::time::Duration;
 
 use bevy_burrow::brush::Edit;
 use bevy_burrow::net::{
-    ClientId, Entry, Hello, KickReason, Lane, Rate, Reach, Refusal, Server, ServerEvent, ServerSettings,
-    ToClient, ToServer, UndoPolicy, UnknownContent,
+    ClientId, Entry, Hello, KickReason, Lane, OrderError, Rate, Reach, Refusal, Server, ServerEvent,
+    ServerSettings, ToClient, ToServer, UndoPolicy,
 };
 use bevy_burrow::prelude::*;
 use bevy_burrow::store::{SimulatedDisk, Store, StoreOptions};
+use bevy_burrow::volume::RulesError;
 use glam::{IVec3, Vec3};
 
 use crate::follower::{Follower, agreed, count, hills, play, terrain};
@@ -65,10 +66,15 @@ fn all_have_the_world_of_the_order() {
             }
         }
         match round % 13 {
-            3 => scene.server.set_rules(random_rules(&mut rng, &scene.ground)).expect("valid rules"),
-            5 => scene.server.set_rules(DiggingRules::default()).expect("valid rules"),
-            7 => scene.server.set_loose(Some(LooseSettings { largest: 4096, crumbs: 8, debris: 100 })),
-            11 => scene.server.set_loose(None),
+            3 => {
+                scene.server.submit(Order::rules(random_rules(&mut rng, &scene.ground))).expect("valid rules")
+            }
+            5 => scene.server.submit(Order::rules(DiggingRules::default())).expect("valid rules"),
+            7 => {
+                let loose = LooseSettings { largest: 4096, crumbs: 8, debris: 100 };
+                scene.server.submit(Order::Loose(Some(loose))).expect("it can be shared");
+            }
+            11 => scene.server.submit(Order::Loose(None)).expect("it can be shared"),
             _ => {}
         }
         scene.play(&mut [&mut a, &mut b, &mut c], 2);
@@ -328,6 +334,26 @@ fn an_undo_is_of_what_was_ordered_before_it() {
 }
 
 #[test]
+fn an_order_of_the_game_that_can_not_be_shared_is_rejected() {
+    let mut scene = Scene::new(generous());
+    let number = scene.server.epoch().number;
+    let rules = DiggingRules::default().with_unbreakable(MaterialId::GROUND);
+    for (order, why) in [
+        (Order::Undo, OrderError::Step(OrderKind::Undo)),
+        (Order::Redo, OrderError::Step(OrderKind::Redo)),
+        (Order::Ground(Arc::clone(&scene.ground)), OrderError::Ground),
+        (Order::rules(rules), OrderError::Rules(RulesError::Ground)),
+    ] {
+        assert_eq!(scene.server.submit(order), Err(why));
+    }
+    let endless = Brush::dig(Shape::sphere(Vec3::splat(20.0), f32::INFINITY));
+    assert!(matches!(scene.server.submit(endless), Err(OrderError::Brush(_))));
+    assert_eq!(scene.server.epoch().number, number);
+    scene.server.submit(dig(30.0, 30.0)).expect("a valid brush");
+    assert_eq!(scene.server.epoch().number, number + 1);
+}
+
+#[test]
 fn a_stamp_that_clients_can_not_read_is_not_ordered() {
     let mut scene = Scene::new(generous());
     let mut a = scene.join(1);
@@ -337,11 +363,11 @@ fn a_stamp_that_clients_can_not_read_is_not_ordered() {
     let stamp = Stamp::new(Arc::clone(&image), at, glam::Vec2::splat(9.0), 3.0);
     let edit = Edit::quantize(&Brush::stamp(Shape::sphere(at, 6.0), stamp)).expect("a valid brush");
     let number = scene.server.epoch().number;
-    assert_eq!(scene.server.edit(edit.clone()), Err(UnknownContent));
+    assert_eq!(scene.server.submit(&edit), Err(OrderError::UnknownContent));
     assert_eq!(scene.server.epoch().number, number);
     scene.server.contents_mut().add(Arc::clone(&image));
     a.contents.add(image);
-    assert_eq!(scene.server.edit(edit), Ok(()));
+    assert_eq!(scene.server.submit(edit), Ok(()));
     scene.play(&mut [&mut a], 3);
     agreed(&scene.server, &[&a]);
     assert!(a.number > number);

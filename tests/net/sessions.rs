@@ -389,7 +389,7 @@ fn a_greeting_that_nobody_heard_is_repeated() {
     assert!(client.has_joined());
     // A client that follows silently does not fall behind either if the server forgets its session.
     server.connect(ID, now);
-    server.edit(random_dig(&mut Rng::with_seed(1))).expect("no stamp");
+    server.submit(random_dig(&mut Rng::with_seed(1))).expect("no stamp");
     (0..200).for_each(|_| pump(&mut server, &mut client, &mut now));
     assert_eq!(client.world().hash(), server.terrain().world().hash());
     assert_eq!(server.figures().malformed, 0);
@@ -450,7 +450,7 @@ fn who_begins_with_the_level_gets_only_what_differs() {
         let served = Terrain::restore(Arc::clone(&ground), &TerrainSettings::default(), level.parts());
         let mut server = Server::new(served.expect("its own parts"), ServerSettings::default());
         let mut now = Duration::from_secs(1);
-        server.edit(random_dig(&mut Rng::with_seed(1))).expect("no stamp");
+        server.submit(random_dig(&mut Rng::with_seed(1))).expect("no stamp");
         server.connect(ID, now);
         let mut client =
             Client::new(Arc::clone(&ground), &TerrainSettings::default()).expect("valid settings");

@@ -69,7 +69,8 @@ impl Party {
         let settings = ServerSettings { undo: UndoPolicy::Own, ..default() };
         let mut ground = Server::new(level(48, 1.0), settings);
         ground.set_permission(|_, edit| edit.tag() != REFUSED);
-        ground.set_loose(Some(LooseSettings { largest: 6000, crumbs: 6, debris: 4000 }));
+        let loose = LooseSettings { largest: 6000, crumbs: 6, debris: 4000 };
+        ground.submit(Order::Loose(Some(loose))).expect("it can be shared");
         let mut server = App::new();
         let replicon = RepliconPlugins.set(ServerPlugin::new(PostUpdate));
         server

@@ -21,19 +21,17 @@ fn frames_show_what_was_undone_and_redone() {
     let last = states.len() - 1;
     assert_eq!(stage.terrain(terrain).history().undos, last);
     for (step, expected) in
-        (0..last).rev().map(|at| (Asked::Undo, at)).chain((1..=last).map(|at| (Asked::Redo, at)))
+        (0..last).rev().map(|at| (OrderKind::Undo, at)).chain((1..=last).map(|at| (OrderKind::Redo, at)))
     {
         match step {
-            Asked::Undo => stage.write(Undo { terrain: Some(terrain) }),
+            OrderKind::Undo => stage.write(Undo { terrain: Some(terrain) }),
             _ => stage.write(Redo { terrain: Some(terrain) }),
         }
         stage.frames_until("the step is reported", |stage| {
             let is_whole = stage.is_settled();
             let recorded = stage.recorded::<HistoryMoved>();
             assert_eq!(recorded.is_empty(), !is_whole, "it is reported in the frame of its commit");
-            assert!(
-                recorded.iter().all(|moved| moved.receipt.outcome.is_ok() && moved.receipt.asked == step)
-            );
+            assert!(recorded.iter().all(|moved| moved.receipt.outcome.is_ok() && moved.receipt.kind == step));
             is_whole
         });
         assert_eq!(stage.hash(terrain), states[expected]);
@@ -61,10 +59,10 @@ fn steps_come_after_the_brushes_of_their_frame() {
         stage.write(ALL);
         stage.settle();
         let steps: Vec<_> = stage.recorded::<HistoryMoved>().into_iter().map(|moved| moved.receipt).collect();
-        let outcomes: Vec<_> = steps.iter().map(|receipt| (receipt.asked, receipt.outcome.is_ok())).collect();
+        let outcomes: Vec<_> = steps.iter().map(|receipt| (receipt.kind, receipt.outcome.is_ok())).collect();
         // Undo comes before redo, whichever was sent first.
         let nothing = Err(Rejection::NothingToUndo);
-        assert_eq!(outcomes, [(Asked::Undo, true), (Asked::Undo, false), (Asked::Redo, true)]);
+        assert_eq!(outcomes, [(OrderKind::Undo, true), (OrderKind::Undo, false), (OrderKind::Redo, true)]);
         assert_eq!(steps[1].outcome, nothing);
         let restored = steps[2].outcome.as_ref().expect("it was redone");
         let dug: u64 =

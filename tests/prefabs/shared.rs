@@ -118,5 +118,5 @@ fn clients_that_lack_a_prefab_get_it_once_and_have_the_servers_world() {
     let unknown = own.world().copy(around, IVec3::splat(21)).expect("it lies in the world");
     let edit = Edit::quantize(&Brush::paste(Paste::new(unknown, Vec3::splat(40.0)))).expect("a valid brush");
     assert!(!play.clients[0].contents_mut().can_send(&edit));
-    assert!(play.server.edit(edit).is_err());
+    assert!(play.server.submit(edit).is_err());
 }

@@ -96,8 +96,11 @@ fn a_ground_waits_its_turn() {
     at_once.apply_one(Order::Ground(after)).outcome.expect("it has the same size");
     at_once.apply(&brushes[4..]);
     assert_same(&queued, &at_once, 3);
-    let kinds: Vec<Asked> = receipts.iter().map(|receipt| receipt.asked).collect();
-    assert_eq!(kinds, [[Asked::Edit; 4].as_slice(), &[Asked::Ground], &[Asked::Edit; 4]].concat());
+    let kinds: Vec<OrderKind> = receipts.iter().map(|receipt| receipt.kind).collect();
+    assert_eq!(
+        kinds,
+        [[OrderKind::Edit; 4].as_slice(), &[OrderKind::Ground], &[OrderKind::Edit; 4]].concat()
+    );
     assert!(receipts[4].outcome.is_ok());
 
     // One of another size is refused, and nothing changes.

@@ -81,27 +81,27 @@ impl Walker {
     }
 
     /// Takes one history step; returns whether there was one.
-    fn step(&mut self, step: Asked) -> bool {
+    fn step(&mut self, step: OrderKind) -> bool {
         match step {
-            Asked::Undo => self.terrain.submit(Order::Undo),
+            OrderKind::Undo => self.terrain.submit(Order::Undo),
             _ => self.terrain.submit(Order::Redo),
         }
         let mut receipts = self.play();
         // If there is nothing to do, there is no transaction.
         receipts.append(&mut self.terrain.take_receipts());
-        let [Receipt { asked: done, outcome, .. }] = &receipts[..] else {
+        let [Receipt { kind: done, outcome, .. }] = &receipts[..] else {
             panic!("{}: one receipt for a step", self.name)
         };
         assert_eq!(*done, step);
         let what = format!("{}, {step:?} to {}", self.name, self.past.len());
         let nothing = match step {
-            Asked::Undo => Rejection::NothingToUndo,
+            OrderKind::Undo => Rejection::NothingToUndo,
             _ => Rejection::NothingToRedo,
         };
         assert!(outcome.as_ref().err().is_none_or(|why| *why == nothing), "{}: {outcome:?}", self.name);
         if outcome.is_ok() {
             let (from, to) = match step {
-                Asked::Undo => (&mut self.past, &mut self.future),
+                OrderKind::Undo => (&mut self.past, &mut self.future),
                 _ => (&mut self.future, &mut self.past),
             };
             let next = from.pop().expect("a step leads to what was");
@@ -115,7 +115,7 @@ impl Walker {
     }
 
     /// Takes as many steps as there are.
-    fn walk(&mut self, step: Asked) -> usize {
+    fn walk(&mut self, step: OrderKind) -> usize {
         let count = (0..).take_while(|_| self.step(step)).count();
         self.displayed.check(self.terrain.world(), &self.name);
         let report = self.terrain.world().check_seams();
@@ -136,9 +136,9 @@ fn five_hundred_edits_of_every_kind_are_undone_and_redone_exactly() {
         assert_eq!(walker.terrain.history().undos, steps, "the budget holds all of {steps}");
         // Rules apply to edits, but not to history steps.
         walker.terrain.set_rules(DiggingRules::default().with_bedrock(i32::MAX)).expect("valid rules");
-        assert_eq!(walker.walk(Asked::Undo), steps);
+        assert_eq!(walker.walk(OrderKind::Undo), steps);
         assert!(walker.now.is_pristine());
-        assert_eq!(walker.walk(Asked::Redo), steps);
+        assert_eq!(walker.walk(OrderKind::Redo), steps);
     }
     statistics.check(12);
 }
@@ -158,8 +158,8 @@ fn a_tight_budget_keeps_the_last_of_five_hundred_edits() {
         let (steps, kept) = (walker.past.len(), walker.terrain.history().undos);
         assert!(0 < kept && kept < steps / 2, "{}: {kept} of {steps} steps are kept", walker.name);
         // A redo may take more bytes than the undo, so the oldest steps are dropped for it.
-        let back = walker.walk(Asked::Undo);
-        let forth = walker.walk(Asked::Redo);
+        let back = walker.walk(OrderKind::Undo);
+        let forth = walker.walk(OrderKind::Redo);
         assert!(0 < back && back <= kept && forth <= back, "{}: {kept}, {back}, {forth}", walker.name);
         println!("{}: {steps} steps, {kept} kept, {back} back, {forth} forth", walker.name);
         lost += kept - forth;

@@ -2,7 +2,7 @@
 
 use bevy_burrow::lattice::LatticeBox;
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Asked, FieldChange, Rejection};
+use bevy_burrow::terrain::{FieldChange, OrderKind, Rejection};
 use glam::{IVec3, Vec3};
 
 fn ball(x: f32, y: f32, z: f32, radius: f32) -> Brush {
@@ -26,17 +26,17 @@ fn history_steps_keep_their_order_among_brushes() {
     terrain.submit(Order::Undo);
     terrain.submit(Order::Undo);
     terrain.submit(Order::Redo);
-    let sent = [Asked::Undo, Asked::Undo, Asked::Redo, Asked::Undo, Asked::Undo];
+    let sent = [OrderKind::Undo, OrderKind::Undo, OrderKind::Redo, OrderKind::Undo, OrderKind::Undo];
     assert_eq!(terrain.queued(), 9);
     let own = terrain.apply([ball(40.0, 10.0, 10.0, 3.0).with_tag(4)]);
     assert_eq!(own.iter().map(|receipt| receipt.tag).collect::<Vec<_>>(), [4]);
     let (moves, edits): (Vec<Receipt>, Vec<Receipt>) =
-        terrain.take_receipts().into_iter().partition(|receipt| receipt.asked.is_step());
+        terrain.take_receipts().into_iter().partition(|receipt| receipt.kind.is_step());
     assert_eq!(edits.iter().map(|receipt| receipt.tag).collect::<Vec<_>>(), [1, 2, 3]);
     let is_done: Vec<bool> = moves.iter().map(|receipt| receipt.outcome.is_ok()).collect();
     // Nothing to undo yet; undo both balls; no redo after the third; undo the third; nothing to undo; redo the third.
     assert_eq!(is_done, [false, true, false, true, false, true]);
-    assert_eq!(moves.iter().map(|receipt| receipt.asked).take(5).collect::<Vec<_>>(), sent);
+    assert_eq!(moves.iter().map(|receipt| receipt.kind).take(5).collect::<Vec<_>>(), sent);
     assert_eq!(terrain.history().undos, 2);
     terrain.undo();
     assert_ne!(terrain.world().hash(), pristine);
@@ -73,7 +73,7 @@ fn a_cancelled_step_is_not_lost() {
     terrain.set_undo_budget(0);
     let receipts = terrain.commit(again).expect("the step is still pending");
     assert_eq!(terrain.world().hash(), pristine);
-    assert!(matches!(&receipts[..], [Receipt { asked: Asked::Undo, outcome: Ok(_), .. }]), "{receipts:?}");
+    assert!(matches!(&receipts[..], [Receipt { kind: OrderKind::Undo, outcome: Ok(_), .. }]), "{receipts:?}");
     assert_eq!(terrain.history(), Default::default());
 }
 

@@ -186,7 +186,7 @@ fn log_history(mut steps: MessageReader<HistoryMoved>) {
         match &receipt.outcome {
             Ok(restored) => println!(
                 "history {:?} removed={} added={}",
-                receipt.asked,
+                receipt.kind,
                 restored.removed.total(),
                 restored.added.total()
             ),

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use bevy::prelude::*;
 use bevy_burrow::plugin::{HistoryMoved, Redo, Undo};
 use bevy_burrow::prelude::*;
-use bevy_burrow::terrain::{Applied, Asked, PieceFate};
+use bevy_burrow::terrain::{Applied, OrderKind, PieceFate};
 use serde::{Deserialize, Serialize};
 
 use crate::player::PlayerControlSystems;
@@ -131,8 +131,8 @@ impl Inventory {
     }
 
     /// Applies an undo or redo of the brushes with these tags, and returns what it changed.
-    pub fn apply_history(&mut self, step: Asked, tags: &[u64]) -> Vec<(MaterialId, i64)> {
-        let sign = if step == Asked::Undo { -1 } else { 1 };
+    pub fn apply_history(&mut self, step: OrderKind, tags: &[u64]) -> Vec<(MaterialId, i64)> {
+        let sign = if step == OrderKind::Undo { -1 } else { 1 };
         let mut total = Amounts::default();
         for change in tags.iter().filter_map(|tag| self.changes.get(tag)) {
             total.iter_mut().zip(change).for_each(|(sum, by)| *sum += sign * by);
@@ -246,7 +246,7 @@ pub fn read_history(
                 // Where players share the ground, a step has no tags, but is always this player's own.
                 let applied = match restored.tags[..] {
                     [] => inventory.apply_restored(restored),
-                    _ => inventory.apply_history(receipt.asked, &restored.tags),
+                    _ => inventory.apply_history(receipt.kind, &restored.tags),
                 };
                 changes.write_batch(applied.into_iter().map(|(material, by)| AmountChanged { material, by }));
             }

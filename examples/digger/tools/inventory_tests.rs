@@ -43,7 +43,7 @@ impl Game {
 
     fn apply_history(&mut self, receipt: &Receipt) -> bool {
         let Ok(restored) = &receipt.outcome else { return false };
-        self.inventory.apply_history(receipt.asked, &restored.tags);
+        self.inventory.apply_history(receipt.kind, &restored.tags);
         true
     }
 

@@ -38,7 +38,7 @@ pub fn parts(a: &WorldParts, b: &WorldParts) -> bool {
 fn commits(a: &CommitRecord, b: &CommitRecord) -> bool {
     let has_change = a.has_change();
     (a.revision, a.hash) == (b.revision, b.hash)
-        && a.entries == b.entries
+        && a.orders == b.orders
         && (!has_change || changes(&a.change, &b.change))
 }
 

@@ -73,8 +73,8 @@ pub enum ClientEvent {
 pub struct ClientFigures {
     /// Entries that were applied.
     pub applied: u64,
-    /// Marks at which all hashes were compared.
-    pub marks: u64,
+    /// Hash checks at which all hashes were compared.
+    pub hash_checks: u64,
     /// Regions that differed from the server's, and were fetched.
     pub repairs: u64,
     /// Times that entries were missing.

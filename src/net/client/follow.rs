@@ -40,8 +40,8 @@ impl Client {
         }
     }
 
-    /// The next entries up to a number, at most `most`. A mark ends them, and parts are returned alone, because pieces
-    /// that they turn into ground have to be found.
+    /// The next entries up to a number, at most `most`. A hash check ends them, and parts are returned alone,
+    /// because pieces that they turn into ground have to be found.
     fn next_batch(&mut self, end: u64, most: usize) -> Vec<Entry> {
         let (mut batch, mut number) = (Vec::new(), self.number());
         let is_parts = |entry: Option<&Entry>| entry.is_some_and(|entry| entry.parts().is_some());
@@ -123,9 +123,9 @@ impl Client {
         self.figures.applied += batch.len() as u64;
         self.epoch = Some(epoch);
         if matches!(self.stage, Stage::Following) {
-            self.marks.touch(applied.regions);
+            self.hash_checks.touch(applied.regions);
             if matches!(batch.last(), Some(Entry::HashCheck)) {
-                self.marks.mark(epoch.number, &mut self.replica);
+                self.hash_checks.record_ours(epoch.number, &mut self.replica);
             }
         }
         self.finish_log();

@@ -42,7 +42,7 @@ impl Client {
         self.outbox = Outbox::new(cost, left, self.now);
         self.wanted.clear();
         self.repair = None;
-        self.marks.clear();
+        self.hash_checks.clear();
         if self.epoch.is_none_or(|known| known.run != epoch.run || known.world != epoch.world) {
             self.waiting.clear();
         }

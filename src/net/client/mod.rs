@@ -6,7 +6,7 @@
 //! | `receive`, `follow` | received messages, and entries of the log |
 //! | `join` | catching up with the server: old entries, regions, a comparison |
 //! | `outbox` | sends the player's edits and undos as fast as the server's limits allow |
-//! | `repair` | marks, and regions that differ |
+//! | `repair` | hash checks, and regions that differ |
 //! | `images` | images, grids and prefabs that are missing |
 //! | `replica` | the world of the log, and the shown world |
 
@@ -41,7 +41,7 @@ use images::Images;
 use join::Stage;
 use outbox::Outbox;
 use pieces::Pieces;
-use repair::{Marks, Reaches, Repair};
+use repair::{HashChecks, Reaches, Repair};
 
 /// The time between acknowledgements, and the bytes of the bulk lane after which one is sent sooner.
 const ACK: Duration = Duration::from_millis(100);
@@ -87,7 +87,7 @@ pub struct Client {
     waiting: BTreeMap<u64, Entry>,
     /// The number of the last entry that came in the main lane.
     received: u64,
-    marks: Marks,
+    hash_checks: HashChecks,
     reaches: Reaches,
     repair: Option<Repair>,
     /// Regions that differ and were not asked for yet.
@@ -144,7 +144,7 @@ impl Client {
             acknowledged: (0, 0, Duration::ZERO),
             waiting: BTreeMap::new(),
             received: 0,
-            marks: Marks::default(),
+            hash_checks: HashChecks::default(),
             reaches: Reaches::default(),
             repair: None,
             wanted: VecDeque::new(),

@@ -44,7 +44,7 @@ impl Client {
             ToClient::Entries(entries) => self.take_entries(lane, entries),
             ToClient::Failed { number } => self.take_failed(number),
             ToClient::Refused { sequence, why } => self.take_refusal(sequence, why),
-            ToClient::Hashes { number, regions } => self.marks.take_theirs(number, regions),
+            ToClient::Hashes { number, regions } => self.hash_checks.take_theirs(number, regions),
             ToClient::Table { number, regions } => self.take_table(number, &regions),
             ToClient::Region(content) => self.take_region(content),
             ToClient::Durable { number } => self.events.push(ClientEvent::Durable(number)),

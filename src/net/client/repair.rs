@@ -1,4 +1,4 @@
-//! Marks: positions of the log at which hashes of regions are compared; and the repair of regions that differ.
+//! Hash checks: positions of the log at which hashes of regions are compared; and the repair of regions that differ.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -9,8 +9,8 @@ use crate::lattice::{BrickPos, LatticeBox, RegionPos};
 use crate::net::replica::Replica;
 use crate::terrain::{Order, Patch};
 
-/// The most marks that wait for the other side.
-const MAX_MARKS: usize = 256;
+/// The most hash checks that wait for the other side.
+const MAX_HASH_CHECKS: usize = 256;
 
 /// The most edits whose reach is remembered, in case the server fails to apply one.
 const MAX_REACHES: usize = 4096;
@@ -21,16 +21,16 @@ const MAX_FAILED: usize = 1 << 16;
 /// The most regions that are fetched because of one failed entry.
 const MAX_DOUBTFUL: usize = 512;
 
-/// The hashes of both sides at marks.
+/// The hashes of both sides at hash checks.
 #[derive(Default)]
-pub(super) struct Marks {
-    /// Regions that were touched since the last mark.
+pub(super) struct HashChecks {
+    /// Regions that were touched since the last hash check.
     touched: BTreeSet<RegionPos>,
     ours: BTreeMap<u64, RegionHashes>,
     theirs: BTreeMap<u64, RegionHashes>,
 }
 
-impl Marks {
+impl HashChecks {
     pub fn clear(&mut self) {
         *self = Self::default();
     }
@@ -39,19 +39,19 @@ impl Marks {
         self.touched.append(&mut regions);
     }
 
-    /// Records the hashes of the confirmed world at a mark.
-    pub fn mark(&mut self, number: u64, replica: &mut Replica) {
+    /// Records the hashes of the confirmed world at a hash check.
+    pub fn record_ours(&mut self, number: u64, replica: &mut Replica) {
         let touched = std::mem::take(&mut self.touched);
         let hashes = touched.into_iter().map(|region| (region, replica.region_hash(region))).collect();
         self.ours.insert(number, hashes);
-        while self.ours.len() > MAX_MARKS {
+        while self.ours.len() > MAX_HASH_CHECKS {
             self.ours.pop_first();
         }
     }
 
     pub fn take_theirs(&mut self, number: u64, regions: RegionHashes) {
         self.theirs.insert(number, regions);
-        while self.theirs.len() > MAX_MARKS {
+        while self.theirs.len() > MAX_HASH_CHECKS {
             self.theirs.pop_first();
         }
     }
@@ -62,7 +62,7 @@ impl Marks {
         self.ours.values_mut().for_each(|hashes| hashes.retain(|(region, _)| !repaired.contains(region)));
     }
 
-    /// Compares marks that both sides have; returns how many, and the regions that differ.
+    /// Compares hash checks that both sides have; returns how many, and the regions that differ.
     fn compare(&mut self, replica: &mut Replica) -> (u64, BTreeSet<RegionPos>) {
         let (mut count, mut differing) = (0, BTreeSet::new());
         let both: Vec<u64> =
@@ -74,8 +74,8 @@ impl Marks {
                 self.theirs.remove(&number).unwrap_or_default().into_iter().collect();
             count += 1;
             for (&region, &hash) in &theirs {
-                // A region that was not touched here before the mark is unchanged since, unless it was touched later:
-                // then the next mark compares it.
+                // A region that was not touched here before the hash check is unchanged since, unless it was touched
+                // later: then the next hash check compares it.
                 let known = ours.get(&region).copied();
                 let known = known.or_else(|| {
                     (!self.is_touched_after(number, region)).then(|| replica.region_hash(region))
@@ -144,8 +144,8 @@ impl Client {
         if !matches!(self.stage, Stage::Following) || self.repair.is_some() {
             return;
         }
-        let (count, mut differing) = self.marks.compare(&mut self.replica);
-        self.figures.marks += count;
+        let (count, mut differing) = self.hash_checks.compare(&mut self.replica);
+        self.figures.hash_checks += count;
         differing.append(&mut self.doubtful);
         if differing.is_empty() {
             return;
@@ -171,7 +171,7 @@ impl Client {
         repair.contents.into_values().for_each(|content| self.put_region(content));
         self.check_pieces(None, &before);
         next_field.into_iter().for_each(|next_field| self.lower_names(next_field));
-        self.marks.forget(&repair.wanted);
+        self.hash_checks.forget(&repair.wanted);
         self.events.push(ClientEvent::Repaired(repair.wanted.into_iter().collect()));
     }
 

@@ -19,10 +19,10 @@ pub(super) const ENTRIES: u8 = 2;
 const RULES: u8 = 128;
 const LOOSE: u8 = 129;
 const PARTS: u8 = 130;
-const MARK: u8 = 131;
+const HASH_CHECK: u8 = 131;
 
 pub(super) fn put_entry(to: &mut Vec<u8>, entry: &Entry, coder: &mut EditSequence) {
-    let Entry::Order { by, order } = entry else { return to.push(MARK) };
+    let Entry::Order { by, order } = entry else { return to.push(HASH_CHECK) };
     match order {
         Order::Edit(edit) => {
             let (author, sequence) = by.unwrap_or((ClientId::SERVER, 0));
@@ -45,7 +45,7 @@ pub(super) fn put_entry(to: &mut Vec<u8>, entry: &Entry, coder: &mut EditSequenc
             put_change(to, change);
         }
         // Steps through history are sent as the parts that they restore, and all machines have one ground.
-        Order::Undo | Order::Redo | Order::Ground(_) => to.push(MARK),
+        Order::Undo | Order::Redo | Order::Ground(_) => to.push(HASH_CHECK),
     }
 }
 
@@ -110,7 +110,7 @@ pub(super) fn read_entry(
             };
             Entry::Order { by, order: Order::parts(read_change(reader, ground)?, None) }
         }
-        MARK => Entry::HashCheck,
+        HASH_CHECK => Entry::HashCheck,
         head => {
             let (author, sequence) = (ClientId(reader.number()?), reader.number()?);
             let Resolved { edit, missing, refused } = coder.read(head, reader, contents)?;

@@ -202,8 +202,8 @@ mod tests {
     use super::*;
     use crate::format::FormatError;
 
-    /// A message of `count` marks.
-    fn marks(count: usize) -> Vec<u8> {
+    /// A message of `count` hash checks.
+    fn hash_checks(count: usize) -> Vec<u8> {
         ToClient::Entries(Entries { first: 1, entries: vec![Entry::HashCheck; count] }).to_bytes()
     }
 
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn packed_messages_are_what_they_were() {
         for count in [0, 1, 5, 1000, MAX_PACKED - 10, MAX_PACKED + 10] {
-            let message = marks(count);
+            let message = hash_checks(count);
             let packed = pack(&message);
             assert!(packed.len() <= message.len());
             assert_eq!(packed.len() < message.len(), (1000..=MAX_PACKED).contains(&count), "{count}");
@@ -231,10 +231,10 @@ mod tests {
         let with_length = |length: u64| {
             let mut packed = vec![PACKED];
             put_number(&mut packed, length);
-            packed.extend(lz4_flex::block::compress(&marks(1000)));
+            packed.extend(lz4_flex::block::compress(&hash_checks(1000)));
             packed
         };
-        let length = marks(1000).len() as u64;
+        let length = hash_checks(1000).len() as u64;
         assert!(read(&with_length(length)).is_ok());
         for wrong in [0, length - 1, length + 1, MAX_PACKED as u64] {
             assert!(matches!(read(&with_length(wrong)), Err(FormatError::Invalid(_))), "{wrong}");

@@ -111,7 +111,7 @@ mod tests {
     use crate::net::message::{Entries, ToClient};
     use crate::terrain::{LooseSettings, Order};
 
-    /// Every third entry is a mark, and the others are loose settings.
+    /// Every third entry is a hash check, and the others are loose settings.
     fn entry(number: u64) -> Entry {
         let loose = LooseSettings { debris: number as u32, ..LooseSettings::default() };
         if number.is_multiple_of(3) { Entry::HashCheck } else { Entry::of_server(Order::Loose(Some(loose))) }

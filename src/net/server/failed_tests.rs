@@ -11,7 +11,7 @@ use crate::brush::{Brush, Shape};
 use crate::ground::Ground;
 use crate::net::regions::regions_of;
 use crate::net::{Client, ClientEvent, region_hash};
-use crate::terrain::{TerrainSettings, WorkLimits};
+use crate::terrain::{Order, Patch, TerrainSettings, WorkLimits};
 
 fn terrain(ground: &Arc<Ground>) -> Terrain {
     Terrain::new(Arc::clone(ground), &TerrainSettings::default()).expect("valid settings")
@@ -192,7 +192,7 @@ fn regions_of_failed_parts_are_fetched() {
     let Patch { bricks, fields, next_field } = other.parts().change;
     for is_known in [false, true] {
         let change = Patch { bricks: bricks.clone(), fields: fields.clone(), next_field };
-        play.server.put(change).expect("it is short");
+        play.server.submit(Order::parts(change, None)).expect("it is short");
         if is_known {
             play.deliver();
         }

@@ -121,9 +121,9 @@ impl Server {
             Bulk::Regions(world, regions) => session.bulk.push_regions(world, &regions),
         }
         if let Some(stream) = session.stream {
-            let mark = ToClient::Stream { stream };
-            self.send(client, &mark);
-            self.outgoing.push((client, Lane::Bulk, mark.to_bytes()));
+            let start = ToClient::Stream { stream };
+            self.send(client, &start);
+            self.outgoing.push((client, Lane::Bulk, start.to_bytes()));
         }
         self.send(client, &ToClient::Welcome(welcome));
         self.report(ServerEvent::Joined(client));

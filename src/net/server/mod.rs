@@ -7,6 +7,7 @@
 //! | `session`, `players` | a connected client, data that is kept for its player |
 //! | `recent` | a table of clients that forgets the oldest |
 //! | `receive`, `validation` | received messages, and the reasons to refuse edits |
+//! | `submit` | orders of the game itself |
 //! | `numbering` | numbers entries, and sends them |
 //! | `entry_log` | the latest entries, in long messages |
 //! | `sequences` | the last sequence numbers of players' edits |
@@ -37,25 +38,24 @@ mod sequences;
 mod session;
 mod settings;
 mod strokes;
+mod submit;
 mod validation;
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fmt;
-use std::sync::Arc;
 use std::time::Duration;
 
 use glam::IVec3;
 
 use super::ContentTable;
-use super::encoding::{EntryWriter, entry_bytes};
-use super::message::{ClientId, Entry, Epoch, KickReason, Lane, MAX_TO_CLIENT, PROTOCOL, ToClient};
+use super::encoding::EntryWriter;
+use super::message::{ClientId, Entry, Epoch, KickReason, Lane, ToClient};
 use super::never_shown;
 use super::regions::RegionSums;
 use crate::brush::Edit;
-use crate::format::{FormatError, WorldId};
+use crate::format::WorldId;
 use crate::lattice::RegionPos;
-use crate::terrain::{EditSettings, LooseSettings, Order, Patch, Terrain};
-use crate::volume::{DiggingRules, RulesError};
+use crate::terrain::{EditSettings, Terrain};
 use entry_log::EntryLog;
 pub use events::{ServerEvent, ServerFigures};
 use kept::Kept;
@@ -65,6 +65,7 @@ use sequences::Sequences;
 use session::Session;
 pub use settings::{Reach, ServerSettings, UndoPolicy};
 use strokes::Strokes;
+pub use submit::OrderError;
 
 /// Decides whether a client may make an edit.
 pub type Permission = Box<dyn Fn(ClientId, &Edit) -> bool + Send + Sync>;
@@ -77,11 +78,6 @@ const MAX_EVENTS: usize = 4096;
 
 /// A message with entries is sent once it has this many bytes, even if more are ordered at the same time.
 const FULL_MESSAGE: usize = 16 << 10;
-
-/// An edit holds an image, grid or prefab that is not in the server's [`ContentTable`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("an image, grid or prefab of the edit is not in the content table")]
-pub struct UnknownContent;
 
 /// A message that waits to be sent.
 pub type Outgoing = (ClientId, Lane, Vec<u8>);
@@ -150,7 +146,7 @@ pub struct Server {
     /// An undo and all later entries, which get numbers after the undo has one, so it applies to everything before it.
     later: VecDeque<Later>,
     strokes: Strokes,
-    /// Regions that were touched since the last mark.
+    /// Regions that were touched since the last hash check.
     touched: BTreeSet<RegionPos>,
     /// The number at which each region changed last, as far as this run knows.
     changed: BTreeMap<RegionPos, u64>,
@@ -158,9 +154,8 @@ pub struct Server {
     encodings: Encodings,
     /// The client whose bulk lane comes first.
     first_bulk: ClientId,
-    last_mark: Duration,
-    /// The number of the last mark.
-    marked: u64,
+    /// The time and the number of the last hash check.
+    last_hash_check: (Duration, u64),
     sessions: BTreeMap<ClientId, Session>,
     players: Players,
     sequences: Sequences,
@@ -232,8 +227,7 @@ impl Server {
             sums: RegionSums::default(),
             encodings: Encodings::default(),
             first_bulk: ClientId(0),
-            last_mark: Duration::ZERO,
-            marked: number,
+            last_hash_check: (Duration::ZERO, number),
             sessions: BTreeMap::new(),
             players: Players::new(settings),
             sequences: Sequences::default(),
@@ -371,56 +365,14 @@ impl Server {
         }
     }
 
-    /// Sets the rules of later edits.
-    ///
-    /// # Errors
-    /// When a rule is for [`MaterialId::GROUND`](crate::ground::MaterialId::GROUND).
-    pub fn set_rules(&mut self, rules: DiggingRules) -> Result<(), RulesError> {
-        rules.check()?;
-        let rules = (!rules.is_empty()).then(|| Arc::new(rules));
-        self.order(Entry::of_server(Order::Rules(rules)));
-        Ok(())
-    }
-
-    /// Sets the loose settings of later edits.
-    pub fn set_loose(&mut self, loose: Option<LooseSettings>) {
-        self.order(Entry::of_server(Order::Loose(loose)));
-    }
-
-    /// Orders an edit of the game, without the checks of clients' edits. Its author is [`ClientId::SERVER`].
-    ///
-    /// # Errors
-    /// When it holds an image, grid or prefab that is not among the [contents](Self::contents_mut): no client could
-    /// read it.
-    pub fn edit(&mut self, edit: Edit) -> Result<(), UnknownContent> {
-        if !self.contents.can_send(&edit) {
-            return Err(UnknownContent);
-        }
-        self.order_edit(ClientId::SERVER, 0, edit, 0);
-        Ok(())
-    }
-
-    /// Orders the replacement of parts.
-    ///
-    /// # Errors
-    /// When they take more bytes than a message may; split them then.
-    pub fn put(&mut self, change: Patch) -> Result<(), FormatError> {
-        let entry = Entry::of_server(Order::parts(change, None));
-        let (length, limit) = (entry_bytes(&entry) as u64, MAX_TO_CLIENT as u64 / 2);
-        if length > limit {
-            return Err(FormatError::TooLarge { length, limit });
-        }
-        self.order(entry);
-        Ok(())
-    }
-
     /// Applies ordered entries, welcomes new clients, and sends bulk data within its limits.
     pub fn advance(&mut self, now: Duration) {
         self.now = self.now.max(now);
-        let is_due = now.saturating_sub(self.last_mark) >= self.settings.mark;
-        if is_due && self.epoch.number > self.marked {
+        let (last, number) = self.last_hash_check;
+        let is_due = now.saturating_sub(last) >= self.settings.hash_check;
+        if is_due && self.epoch.number > number {
             self.order(Entry::HashCheck);
-            (self.last_mark, self.marked) = (now, self.epoch.number);
+            self.last_hash_check = (now, self.epoch.number);
         }
         self.apply();
         self.log.trim(self.applied);

@@ -36,7 +36,7 @@ pub struct Fetch {
 /// A connected client. Everything except the time belongs to its [stream](crate::net::ToServer::Greeting).
 pub struct Session {
     pub stage: Stage,
-    /// The stream that it began last; `None` for one without marks.
+    /// The stream that it began last; `None` if it began none.
     pub stream: Option<u64>,
     /// When it connected, or was last asked to greet.
     pub asked: Duration,

@@ -69,8 +69,8 @@ pub struct ServerSettings {
     pub work: u64,
     /// The maximum amount of work that may wait; edits beyond it are refused.
     pub waiting: u64,
-    /// The time between marks.
-    pub mark: Duration,
+    /// The time between hash checks, at which clients compare the regions that were touched with those of the server.
+    pub hash_check: Duration,
 }
 
 impl Default for ServerSettings {
@@ -90,7 +90,7 @@ impl Default for ServerSettings {
             // Some 40 ms, however much comes at once; at 30 frames a second, all that 64 players may spend.
             work: 10_000,
             waiting: 6_000_000,
-            mark: Duration::from_secs(1),
+            hash_check: Duration::from_secs(1),
         }
     }
 }

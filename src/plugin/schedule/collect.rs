@@ -15,7 +15,7 @@ use crate::plugin::{
     BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned,
     Redo, TargetedBrush, Undo,
 };
-use crate::terrain::{Asked, LooseSettings, Order, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique};
+use crate::terrain::{LooseSettings, Order, OrderKind, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique};
 use crate::threads::free_later;
 
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected
@@ -116,8 +116,8 @@ fn queue(terrain: &mut Terrain, request: Request, together: Together) -> Result<
 }
 
 /// Whether the plugin reports an order's receipt as [`BrushApplied`].
-fn is_edit(asked: Asked) -> bool {
-    asked == Asked::Edit
+fn is_edit(kind: OrderKind) -> bool {
+    kind == OrderKind::Edit
 }
 
 /// Logs the first brush that a terrain cannot apply. Receipts report all of them.
@@ -205,7 +205,7 @@ pub(in crate::plugin) fn collect_steps(
             None => terrains.iter_mut().for_each(|(_, terrain, outbox)| submit(terrain, outbox)),
         }
         if !is_taken {
-            messages.moved.write(gone(target, step.asked()));
+            messages.moved.write(gone(target, step.kind()));
         }
     }
     // Results of steps that the queue had no room for, and of steps that the game took itself.
@@ -268,10 +268,10 @@ pub(super) fn send_history(
     terrain: &mut Mut<Terrain>,
     messages: &mut HistoryMessages,
 ) -> Vec<Receipt> {
-    if !terrain.has_receipts(Asked::is_step) {
+    if !terrain.has_receipts(OrderKind::is_step) {
         return Vec::new();
     }
-    let receipts = terrain.take_receipts_of(Asked::is_step);
+    let receipts = terrain.take_receipts_of(OrderKind::is_step);
     for receipt in &receipts {
         let returned = receipt.outcome.iter().flat_map(|applied| &applied.returned);
         let message = |piece: &ReturnedPiece| LoosePieceReturned { terrain: entity, piece: piece.clone() };
@@ -281,7 +281,7 @@ pub(super) fn send_history(
     receipts
 }
 
-fn gone(terrain: Option<Entity>, step: Asked) -> HistoryMoved {
+fn gone(terrain: Option<Entity>, step: OrderKind) -> HistoryMoved {
     HistoryMoved { terrain, receipt: Receipt::of(step, Err(Rejection::TerrainGone)) }
 }
 
@@ -299,12 +299,12 @@ pub(in crate::plugin) fn answer_removed(
     let answered = terrain.take_receipts_of(is_edit).into_iter();
     answers.write_batch(answered.map(|receipt| BrushApplied { terrain: Some(gone.entity), receipt }));
     send_history(gone.entity, &mut terrain, &mut messages);
-    for (asked, tag) in terrain.unanswered() {
-        if is_edit(asked) {
+    for (kind, tag) in terrain.unanswered() {
+        if is_edit(kind) {
             let receipt = Receipt::of_edit(tag, Err(Rejection::TerrainGone));
             answers.write(BrushApplied { terrain: Some(gone.entity), receipt });
-        } else if asked.is_step() {
-            messages.moved.write(self::gone(Some(gone.entity), asked));
+        } else if kind.is_step() {
+            messages.moved.write(self::gone(Some(gone.entity), kind));
         }
     }
     terrain.forget();

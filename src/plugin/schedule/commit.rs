@@ -25,7 +25,7 @@ use crate::plugin::{
 };
 #[cfg(any(feature = "scatter", feature = "landmass"))]
 use crate::terrain::Version;
-use crate::terrain::{Asked, Receipt, Rejection, Terrain};
+use crate::terrain::{OrderKind, Receipt, Rejection, Terrain};
 use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
@@ -308,7 +308,7 @@ fn commit(
         versions: [before, terrain.world().version()],
         boxes: (!is_whole).then_some(boxes),
     });
-    let is_step = terrain.has_receipts(Asked::is_step);
+    let is_step = terrain.has_receipts(OrderKind::is_step);
     send_history(entity, &mut terrain, &mut messages.history);
     // Another world is loaded like a new terrain; until then the old one is shown.
     if !is_whole {

@@ -17,7 +17,8 @@ use crate::plugin::figures::TaskTimes;
 use crate::plugin::meshes::{BuiltNode, BuiltSurface, SurfaceBuilder};
 use crate::redraw::{relit_nodes, relit_parts};
 use crate::terrain::{
-    Asked, Commit, MeshKey, MeshUpdates, PendingDisplay, Receipt, SurfaceDraft, Terrain, Transaction, World,
+    Commit, MeshKey, MeshUpdates, OrderKind, PendingDisplay, Receipt, SurfaceDraft, Terrain, Transaction,
+    World,
 };
 use crate::threads::{ThreadTask, Threads};
 use crate::world::sky::{LitWorld, REACH};
@@ -167,9 +168,9 @@ impl InFlight {
         let Some(Ok(TaskOutput { change: Change::Transaction(commit), pieces, .. })) = &self.done else {
             return false;
         };
-        let is_own = |receipt: &Receipt| match receipt.asked {
-            Asked::Edit => true,
-            Asked::Undo | Asked::Redo => {
+        let is_own = |receipt: &Receipt| match receipt.kind {
+            OrderKind::Edit => true,
+            OrderKind::Undo | OrderKind::Redo => {
                 receipt.outcome.as_ref().is_ok_and(|applied| applied.returned.is_empty())
             }
             _ => false,

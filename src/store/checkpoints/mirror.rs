@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::lattice::{ChunkGrid, RegionPos};
 use crate::store::base_level::BaseLevel;
 use crate::store::regions::Region;
-use crate::terrain::{CommitRecord, EditSettings, LogEntry, Order, Patch, WorldParts};
+use crate::terrain::{CommitRecord, EditSettings, Order, Patch, WorldParts};
 
 /// A world by regions.
 #[derive(Clone, Debug)]
@@ -64,10 +64,10 @@ impl Mirror {
 
     /// Applies the changes of a commit.
     pub fn apply(&mut self, record: &CommitRecord) {
-        for entry in &record.entries {
-            match entry {
-                LogEntry::Order(Order::Rules(rules)) => self.edit_settings.rules.clone_from(rules),
-                LogEntry::Order(Order::Loose(loose)) => self.edit_settings.loose = *loose,
+        for order in &record.orders {
+            match order {
+                Order::Rules(rules) => self.edit_settings.rules.clone_from(rules),
+                Order::Loose(loose) => self.edit_settings.loose = *loose,
                 _ => {}
             }
         }

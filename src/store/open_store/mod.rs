@@ -31,7 +31,7 @@ use crate::store::regions::sources::has_world;
 use crate::store::store_thread::{
     ClosingStore, Content, GameData, Message, SavePoint, Shared, StoreThread, Writer,
 };
-use crate::terrain::{CommitRecord, EditSettings, LogEntry, Patch, Terrain, TerrainSettings, Version};
+use crate::terrain::{CommitRecord, EditSettings, Terrain, TerrainSettings, Version};
 
 /// The file that is locked while a world is open.
 const LOCK: &str = "lock";
@@ -156,10 +156,9 @@ impl Store {
         let mirror = Mirror::new(grid, parts, hash, data.clone(), level);
         // A log that begins with the level, or with a pristine world, is whole. Rules are in it too, then.
         let is_whole = revision == 0 && mirror.is_as_level() && data.is_empty();
-        let mut entries = Vec::new();
+        let mut orders = Vec::new();
         if is_whole {
-            let orders = edit_settings.orders_after(Some(&EditSettings::default()));
-            entries.extend(orders.map(LogEntry::Order));
+            orders.extend(edit_settings.orders_after(Some(&EditSettings::default())));
         }
         let frame = u64::from(!is_whole);
         let (journal, database) = ((Vec::new(), frame + 1), RegionFile::new());
@@ -167,8 +166,8 @@ impl Store {
             Writer::new(files, options, world, ground, settings, mirror, journal, database, frame, lock);
         writer.save_all()?;
         let mut store = Self::start(writer, terrain)?;
-        if !entries.is_empty() {
-            let record = CommitRecord { number: 0, revision, hash, entries, change: Patch::default() };
+        if !orders.is_empty() {
+            let record = CommitRecord { number: 0, revision, hash, orders, change: Arc::default() };
             store.give(store.point, Content::Commits(vec![record]))?;
             store.flush()?;
         }

@@ -319,7 +319,7 @@ mod tests {
     use crate::format::frame::WorldId;
     use crate::store::regions::database;
     use crate::store::{SimulatedDisk, Store, inspect_in};
-    use crate::terrain::{CommitRecord, LogEntry, Order};
+    use crate::terrain::{CommitRecord, Order};
 
     /// Rewrites the frames of a journal as a version with another simulation would have written them: on another base,
     /// and with commits that are changed in this way.
@@ -437,7 +437,7 @@ mod tests {
         by_another_simulation(&killed, world, &ground, |record| {
             if record.revision < 5 {
                 let edit = Edit::quantize(&dig(record.revision as u32 - 1, 40.0)).unwrap();
-                record.entries = vec![LogEntry::Order(Order::Edit(edit))];
+                record.orders = vec![Order::Edit(edit)];
             }
         });
         let lost = RegionPos::of(BrickPos::of(glam::IVec3::new(96, 20, 30)));

@@ -11,7 +11,8 @@ use crate::store::journal::segment::Frame;
 use crate::store::progress::{Progress, Work};
 use crate::store::store_thread::{GameData, apply_game};
 use crate::terrain::{
-    Asked, CommitRecord, Meshing, Order, Patch, ReplayError, Terrain, TerrainSettings, WorkLimits, WorldParts,
+    CommitRecord, Meshing, Order, OrderKind, Patch, ReplayError, Terrain, TerrainSettings, WorkLimits,
+    WorldParts,
 };
 
 /// The share of opening after which a world is recovered that has to be saved whole.
@@ -141,18 +142,18 @@ fn replay(
 
 /// Replays a record on a world that differs from the one it was made on. Edits that this world rejects are left out.
 fn replay_unchecked(terrain: &mut Terrain, record: &CommitRecord) -> Result<(), ReplayError> {
-    let orders = record.orders().map(|order| match order {
+    let orders = record.orders.iter().map(|order| match order {
         // Its fields are those of the other world.
         Order::Parts { change, .. } => {
             let bricks = change.bricks.clone();
             Order::Parts { change: Arc::new(Patch { bricks, ..Patch::default() }), hash: None }
         }
-        order => order,
+        order => order.clone(),
     });
-    // Without an entry, all of its edits were rejected.
-    if !record.entries.is_empty() {
+    // Without an order, all of its edits were rejected.
+    if !record.orders.is_empty() {
         let receipts = terrain.apply(orders);
-        let mut others = receipts.iter().filter(|receipt| receipt.asked != Asked::Edit);
+        let mut others = receipts.iter().filter(|receipt| receipt.kind != OrderKind::Edit);
         if let Some(why) = others.find_map(|receipt| receipt.outcome.as_ref().err()) {
             return Err(ReplayError::of(why, record.revision));
         }

@@ -56,7 +56,7 @@ impl Given {
 }
 
 pub(super) fn record_bytes(record: &CommitRecord) -> usize {
-    64 + record.entries.len() * 64 + record.change.bricks.len() * 1024
+    64 + record.orders.len() * 64 + record.change.bricks.len() * 1024
 }
 
 pub(super) fn game_bytes((key, value): &GameChange) -> usize {

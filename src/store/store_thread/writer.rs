@@ -20,7 +20,7 @@ use crate::store::journal::segment::{self, FRAME_LIMIT};
 use crate::store::journal::{Journal, Segment, unsaved};
 use crate::store::options::StoreOptions;
 use crate::store::regions::RegionFile;
-use crate::terrain::{CommitRecord, LogEntry, Order, Patch, TerrainSettings};
+use crate::terrain::{CommitRecord, Order, TerrainSettings};
 
 /// The first wait before something that failed is tried again, and the longest.
 const RETRY: (Duration, Duration) = (Duration::from_millis(100), Duration::from_secs(10));
@@ -313,7 +313,7 @@ impl Writer {
         self.state.commits += 1;
         // Edits lead to the same bricks again.
         if !record.has_change() {
-            record.change = Patch::default();
+            record.change = Arc::default();
         }
         self.state.pending.push(record);
     }
@@ -434,8 +434,8 @@ impl Writer {
 
 /// The ground that a commit set, if it is one that did.
 fn new_ground(record: &CommitRecord) -> Option<Arc<Ground>> {
-    record.entries.iter().rev().find_map(|entry| match entry {
-        LogEntry::Order(Order::Ground(ground)) => Some(Arc::clone(ground)),
+    record.orders.iter().rev().find_map(|order| match order {
+        Order::Ground(ground) => Some(Arc::clone(ground)),
         _ => None,
     })
 }

@@ -9,7 +9,7 @@ use rustc_hash::FxHashMap;
 
 use super::draft_group::{Found, LoosePieces, draft_group};
 use super::field_log::{FieldChange, FieldLog};
-use super::resolved::Resolved;
+use super::resolved::{Outcome, Resolved};
 use crate::brush::Edit;
 use crate::edits::{DraftedBrick, Drafter, EditDelta, EditEffect, MergedBricks, PreparedEdits, latest};
 use crate::lattice::{BrickPos, ChunkPos, ItemCost, parallel_map_into, side_by_side};
@@ -150,14 +150,14 @@ pub(crate) fn edits(scene: Scene, submissions: &[Submission]) -> Resolved {
         UndoDelta::new(change, replaced_bytes, number, (tags, pieces))
     });
     let changes = changes.collect();
-    Resolved {
+    let outcome = Outcome {
         uniform: drafter.into_uniform(),
         receipts: entered.receipts,
         news: entered.news,
         next_field: entered.next_field,
-        stages,
-        ..Resolved::new(world, changes, draft.hash, meshes)
-    }
+        ..Outcome::new(world, changes, draft.hash)
+    };
+    Resolved { outcome, meshes, stages }
 }
 
 /// Updates fields and creates receipts from the effects of edits. Each group comes with the bricks that it changed.

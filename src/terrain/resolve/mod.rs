@@ -19,7 +19,7 @@ mod step;
 
 pub use field_log::FieldChange;
 pub(crate) use parts::world_of;
-pub(crate) use resolved::{Resolved, install, patch_of};
+pub(crate) use resolved::{Outcome, Resolved};
 
 /// Resolves the orders of a transaction: edits, or one order of another kind; `target` is the content that a step
 /// through history restores.
@@ -33,7 +33,7 @@ pub(super) fn orders(scene: Scene, submissions: &[Submission], target: Option<&U
         (Some((_, Order::Parts { change, hash })), _) => parts::parts(scene, change, *hash),
         (Some((_, Order::Ground(ground))), _) => parts::ground(scene, ground),
         (Some((own, Order::Edit(edit))), _) if edit.kind() == Kind::Reset => reset::reset(scene, own, edit),
-        (Some((_, step)), Some(target)) => step::step(scene, step.asked(), target),
+        (Some((_, step)), Some(target)) => step::step(scene, step.kind(), target),
         _ => edits::edits(scene, submissions),
     };
     resolved.stages.whole = start.elapsed();

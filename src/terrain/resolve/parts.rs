@@ -6,13 +6,13 @@ use rayon::prelude::*;
 use rustc_hash::FxHashSet;
 
 use super::replacement::Replacement;
-use super::resolved::{Resolved, install};
+use super::resolved::Resolved;
 use crate::backend::Cpu;
 use crate::ground::Ground;
 use crate::lattice::BrickPos;
 use crate::redraw::{Scene, Stages};
 use crate::terrain::parts_error::{PartsError, check_number};
-use crate::terrain::receipt::{Applied, Asked, Receipt};
+use crate::terrain::receipt::{Applied, OrderKind, Receipt};
 use crate::volume::layers::{self, offset};
 use crate::volume::{Brick, Field, FieldId, UniformBricks, pristine_layers};
 use crate::world::{Change, ChangedBrick, Meshing, Patch, World, brick_over};
@@ -43,21 +43,21 @@ fn checked(
 
 /// Resolves replaced parts; `hash` is the one that the world must have afterwards.
 pub(crate) fn parts(scene: Scene, change: &Patch, hash: Option<u64>) -> Resolved {
-    answered(scene.world, Asked::Parts, replaced(scene, change, hash, true))
+    answered(scene.world, OrderKind::Parts, replaced(scene, change, hash, true))
 }
 
 /// Resolves another ground.
 pub(crate) fn ground(scene: Scene, ground: &Arc<Ground>) -> Resolved {
-    answered(scene.world, Asked::Ground, on_ground(scene.world, ground))
+    answered(scene.world, OrderKind::Ground, on_ground(scene.world, ground))
 }
 
 /// Adds the receipt.
-fn answered(world: &World, asked: Asked, result: Result<(Resolved, Applied), PartsError>) -> Resolved {
+fn answered(world: &World, kind: OrderKind, result: Result<(Resolved, Applied), PartsError>) -> Resolved {
     let (resolved, outcome) = match result {
         Ok((resolved, applied)) => (resolved, Ok(applied)),
         Err(why) => (Resolved::nothing(world), Err(why.into())),
     };
-    Resolved { receipts: vec![Receipt::of(asked, outcome)], ..resolved }
+    resolved.with_receipt(Receipt::of(kind, outcome))
 }
 
 /// A world of these parts. Nothing is meshed: surfaces are made when they are asked for.
@@ -70,9 +70,9 @@ pub(crate) fn world_of(
     check_number(revision)?;
     let mut world = World::new(ground, chunk_size);
     let scene = Scene { world: &world, meshing: Meshing::Never, cut: None, backend: &Cpu };
-    let (Resolved { changes, uniform, next_field, meshes, .. }, _) = replaced(scene, &parts, None, false)?;
+    let (Resolved { outcome, meshes, .. }, _) = replaced(scene, &parts, None, false)?;
     // The replaced parts are pristine.
-    drop(install(&mut world, changes, uniform, meshes.kept(), next_field));
+    drop(outcome.install(&mut world, meshes.kept()));
     world.revision = revision;
     Ok(world)
 }
@@ -89,8 +89,10 @@ fn on_ground(before: &World, ground: &Arc<Ground>) -> Result<(Resolved, Applied)
         *brick = brick.take().map(|brick| brick_over(ground, *pos, brick));
     }
     let world = world_of(Arc::clone(ground), before.grid.size(), parts, before.revision)?;
-    let (next_field, whole) = (world.next_field, Some(Arc::new(world)));
-    Ok((Resolved { next_field, whole, ..Resolved::nothing(before) }, Applied::default()))
+    let mut resolved = Resolved::nothing(before);
+    resolved.outcome.next_field = world.next_field;
+    resolved.outcome.whole = Some(Arc::new(world));
+    Ok((resolved, Applied::default()))
 }
 
 /// Replaces parts. Without `counts` the receipt counts no voxels.
@@ -118,8 +120,9 @@ fn replaced(
         return Err(PartsError::Hash { found, expected });
     }
     replacement.update_mask();
-    let (resolved, applied) = replacement.resolve(0, Default::default());
-    Ok((Resolved { uniform, ..resolved }, applied))
+    let (mut resolved, applied) = replacement.resolve(0, Default::default());
+    resolved.outcome.uniform = uniform;
+    Ok((resolved, applied))
 }
 
 fn check_order(bricks: &[ChangedBrick]) -> Result<(), PartsError> {

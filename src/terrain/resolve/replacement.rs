@@ -7,7 +7,7 @@ use glam::IVec3;
 use rustc_hash::FxHashSet;
 
 use super::field_log::news_of_replaced;
-use super::resolved::Resolved;
+use super::resolved::{Outcome, Resolved};
 use crate::edits::{EditEffect, count_replaced};
 use crate::lattice::{BrickPos, ItemCost, LatticeBox, parallel_map};
 use crate::loose::LoosePiece;
@@ -145,8 +145,7 @@ impl<'a> Replacement<'a> {
         let sample_hash = change.sample_hash;
         let next_field = world.next_field.max(change.patch.next_field);
         let delta = UndoDelta::new(change, replaced_bytes, group, (tags, pieces));
-        let resolved =
-            Resolved { news, next_field, stages, ..Resolved::new(world, vec![delta], sample_hash, meshes) };
-        (resolved, applied)
+        let outcome = Outcome { news, next_field, ..Outcome::new(world, vec![delta], sample_hash) };
+        (Resolved { outcome, meshes, stages }, applied)
     }
 }

@@ -23,8 +23,7 @@ use crate::world::{Change, Patch, World};
 pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resolved {
     let (world, tag, mut stages) = (scene.world, submission.tag, Stages::default());
     if reach(world.grid, edit).is_none() {
-        let receipts = vec![Receipt::of_edit(tag, Err(Rejection::OutsideWorld))];
-        return Resolved { receipts, ..Resolved::nothing(world) };
+        return Resolved::nothing(world).with_receipt(Receipt::of_edit(tag, Err(Rejection::OutsideWorld)));
     }
     // Counts only what rules refuse.
     let mut effect = EditEffect::default();
@@ -42,7 +41,7 @@ pub(super) fn reset(scene: Scene, submission: &Submission, edit: &Edit) -> Resol
     replacement.update_mask();
     let (resolved, applied) = replacement.resolve(submission.group, (tags, Vec::new()));
     let applied = Applied { chunks, refused: effect.refused, ..applied };
-    Resolved { receipts: vec![Receipt::of_edit(tag, Ok(applied))], ..resolved }
+    resolved.with_receipt(Receipt::of_edit(tag, Ok(applied)))
 }
 
 /// The fields of each chunk in which samples were reset, shrunk to what is left of them; and what the receipt says.

@@ -10,8 +10,15 @@ use crate::terrain::receipt::Receipt;
 use crate::volume::UniformBricks;
 use crate::world::{NewSurfaces, Patch, World};
 
-/// The result of a transaction's work: the parts that change, how they are drawn, and the answers.
+/// The result of a transaction's work: what changes, and how it is drawn.
 pub(crate) struct Resolved {
+    pub outcome: Outcome,
+    pub meshes: MeshUpdates,
+    pub stages: Stages,
+}
+
+/// What a transaction changes in the world, and the receipts of its orders.
+pub(crate) struct Outcome {
     /// The parts that groups of edits change, in order, or a step through history.
     pub changes: Vec<UndoDelta>,
     /// Hash of all samples afterwards.
@@ -25,18 +32,25 @@ pub(crate) struct Resolved {
     pub news: Vec<(ChunkPos, FieldChange)>,
     /// The new world, if all of it is replaced.
     pub whole: Option<Arc<World>>,
-    pub meshes: MeshUpdates,
-    pub stages: Stages,
 }
 
 impl Resolved {
     /// Nothing changes.
     pub fn nothing(world: &World) -> Self {
-        Self::new(world, Vec::new(), world.sample_hash, MeshUpdates::default())
+        let outcome = Outcome::new(world, Vec::new(), world.sample_hash);
+        Self { outcome, meshes: MeshUpdates::default(), stages: Stages::default() }
     }
 
-    /// These parts change, and this is drawn then.
-    pub fn new(world: &World, changes: Vec<UndoDelta>, sample_hash: u64, meshes: MeshUpdates) -> Self {
+    /// Sets the receipt of its only order.
+    pub fn with_receipt(mut self, receipt: Receipt) -> Self {
+        self.outcome.receipts = vec![receipt];
+        self
+    }
+}
+
+impl Outcome {
+    /// These parts change.
+    pub fn new(world: &World, changes: Vec<UndoDelta>, sample_hash: u64) -> Self {
         Self {
             changes,
             sample_hash,
@@ -45,39 +59,32 @@ impl Resolved {
             receipts: Vec::new(),
             news: Vec::new(),
             whole: None,
-            meshes,
-            stages: Stages::default(),
         }
     }
-}
 
-/// Makes parts those of a world, in order, and returns what they replaced.
-pub(crate) fn install(
-    world: &mut World,
-    mut changes: Vec<UndoDelta>,
-    uniform: Option<UniformBricks>,
-    kept: NewSurfaces,
-    next_field: u64,
-) -> Vec<UndoDelta> {
-    changes.iter_mut().for_each(|own| own.change.swap(world));
-    changes.retain(|own| !own.change.patch.bricks.is_empty());
-    if let Some(uniform) = uniform {
-        world.set_uniform(uniform);
+    /// The bricks and fields that its changes lead to, or those of the new world.
+    pub fn patch(&self) -> Patch {
+        if let Some(whole) = &self.whole {
+            return whole.all_parts();
+        }
+        let mut changes = self.changes.iter().map(|own| own.change.patch.clone());
+        let mut patch = changes.next().unwrap_or_default();
+        changes.for_each(|later| patch.then(later));
+        patch.next_field = self.next_field;
+        patch
     }
-    world.meshes.apply(kept);
-    world.shrink();
-    world.next_field = next_field;
-    changes
-}
 
-/// The bricks and fields that changes in order lead to, or those of another world.
-pub(crate) fn patch_of(changes: &[UndoDelta], whole: Option<&World>, next_field: u64) -> Patch {
-    if let Some(whole) = whole {
-        return whole.all_parts();
+    /// Makes its changes those of a world, in order, with the surfaces to keep; returns what they replaced.
+    pub fn install(self, world: &mut World, kept: NewSurfaces) -> Vec<UndoDelta> {
+        let Self { mut changes, uniform, next_field, .. } = self;
+        changes.iter_mut().for_each(|own| own.change.swap(world));
+        changes.retain(|own| !own.change.patch.bricks.is_empty());
+        if let Some(uniform) = uniform {
+            world.set_uniform(uniform);
+        }
+        world.meshes.apply(kept);
+        world.shrink();
+        world.next_field = next_field;
+        changes
     }
-    let mut changes = changes.iter().map(|own| own.change.patch.clone());
-    let mut patch = changes.next().unwrap_or_default();
-    changes.for_each(|later| patch.then(later));
-    patch.next_field = next_field;
-    patch
 }

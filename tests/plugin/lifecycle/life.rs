@@ -6,7 +6,7 @@ use super::*;
 #[derive(Clone, Debug)]
 pub(super) enum Request {
     Brush(Brush),
-    Step(Asked),
+    Step(OrderKind),
     /// A game's own edit, which is done at once.
     Own(Brush),
 }
@@ -351,7 +351,7 @@ impl Life {
         Some(parent.map_or(GlobalTransform::IDENTITY, |parent| GlobalTransform::from(*parent)) * local)
     }
 
-    pub(super) fn step(&mut self, step: Asked) {
+    pub(super) fn step(&mut self, step: OrderKind) {
         if !self.is_alive() {
             return;
         }
@@ -363,7 +363,7 @@ impl Life {
         self.expected.requests.push(Request::Step(step));
         let terrain = Some(self.terrain);
         match step {
-            Asked::Undo => self.stage.write(Undo { terrain }),
+            OrderKind::Undo => self.stage.write(Undo { terrain }),
             _ => self.stage.write(Redo { terrain }),
         }
     }
@@ -453,8 +453,8 @@ impl Life {
                 self.sent.push(brush.tag);
                 self.stage.send(brush.transformed(Quat::IDENTITY, Vec3::X * 9000.0, 1.0));
             }
-            Event::Undo => self.step(Asked::Undo),
-            Event::Redo => self.step(Asked::Redo),
+            Event::Undo => self.step(OrderKind::Undo),
+            Event::Redo => self.step(OrderKind::Redo),
             Event::OwnEdit => {
                 self.settle();
                 let brush = self.brush();
@@ -666,7 +666,7 @@ impl Life {
                 Request::Brush(brush) | Request::Own(brush) => {
                     plain.apply([brush]);
                 }
-                Request::Step(Asked::Undo) => {
+                Request::Step(OrderKind::Undo) => {
                     plain.undo();
                 }
                 // Others may have dug there: who shares a terrain digs again.

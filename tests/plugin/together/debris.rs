@@ -63,7 +63,8 @@ impl Party {
         let hash = built().world().hash();
         let mut server = Server::new(built(), settings());
         server.set_permission(|_, edit| edit.tag() != REFUSED);
-        server.set_loose(Some(LooseSettings { crumbs: 8, debris: 9000, ..default() }));
+        let loose = LooseSettings { crumbs: 8, debris: 9000, ..default() };
+        server.submit(Order::Loose(Some(loose))).expect("it can be shared");
         let mut party = Self::without_ground(AuthMethod::ProtocolCheck);
         party.server.insert_resource(GroundServer::new(server));
         for _ in 0..2 {

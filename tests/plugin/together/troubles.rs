@@ -117,7 +117,7 @@ fn rules_of_a_shared_terrain_are_the_servers() {
     party.rounds_until("it is dug all the same", |party| party.agrees() && party.terrain_hash(1) != before);
     // As the report says.
     party.server.world_mut().resource_mut::<GroundServer>().with(move |server| {
-        server.set_rules(rules).expect("valid rules");
+        server.submit(Order::rules(rules)).expect("valid rules");
     });
     party.rounds(30);
     let before = party.terrain_hash(1);
