@@ -48,7 +48,7 @@ struct Row {
     tiles: bool,
 }
 
-#[derive(Resource, PartialEq)]
+#[derive(Resource, Clone, PartialEq)]
 struct Playing(bool);
 
 fn stage() -> Stage {
@@ -64,21 +64,8 @@ fn stage() -> Stage {
     )
     .recording::<WorldSaved>()
     .recording::<PlantRemoved>();
-    stage
-        .app
-        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 64.0)))
-        .insert_resource(Playing(true))
-        .configure_sets(
-            Update,
-            (
-                BurrowSystems::Load,
-                BurrowSystems::Collect,
-                BurrowSystems::Commit,
-                BurrowSystems::Begin,
-                BurrowSystems::Propagate,
-            )
-                .run_if(resource_equals(Playing(true))),
-        );
+    stage.app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 64.0)));
+    stage.run_while(Playing(true));
     stage
 }
 

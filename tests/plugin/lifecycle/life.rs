@@ -70,7 +70,7 @@ impl SurfaceProcessor for Slow {
     }
 }
 
-#[derive(Resource, PartialEq)]
+#[derive(Resource, Clone, PartialEq)]
 pub(super) struct Runs(pub(super) bool);
 
 /// An app in which things happen to a terrain.
@@ -130,22 +130,11 @@ impl Life {
         stage
             .app
             .insert_resource(BurrowSettings { loads_per_frame: 8, swaps_per_frame: 24, ..default() })
-            .insert_resource(Runs(true))
             .init_resource::<Lonely>()
             .add_observer(|new: On<Add, Tile>, parents: Query<&ChildOf>, mut lonely: ResMut<Lonely>| {
                 lonely.0 += usize::from(!parents.contains(new.entity));
-            })
-            .configure_sets(
-                Update,
-                (
-                    BurrowSystems::Load,
-                    BurrowSystems::Collect,
-                    BurrowSystems::Commit,
-                    BurrowSystems::Begin,
-                    BurrowSystems::Propagate,
-                )
-                    .run_if(resource_equals(Runs(true))),
-            );
+            });
+        stage.run_while(Runs(true));
         change(&mut stage.app);
         let mut rng = Rng::with_seed(seed);
         let place = Transform::from_xyz(20.0, 30.0, 20.0);
