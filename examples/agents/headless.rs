@@ -1,6 +1,8 @@
 //! Runs without a window: makes pictures and a report.
 
-use std::path::Path;
+#[path = "../shared/headless_app.rs"]
+mod headless_app;
+
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -8,14 +10,12 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use bevy_burrow::paths::NavigationTiles;
 use bevy_burrow::prelude::*;
+use headless_app::photo::wait_until;
+use headless_app::{FRAME, shoot};
 
+use crate::Options;
 use crate::figures::COUNT;
-use crate::photo::{Photographer, wait_until};
 use crate::story::{Chapter, Story};
-use crate::{Options, offscreen};
-
-/// Time from frame to frame.
-const FRAME: Duration = Duration::from_micros(15_625);
 
 /// The most frames of a run, even if figures are still on their way.
 const FRAMES: u32 = 64 * 90;
@@ -36,10 +36,11 @@ pub fn run(options: &Options) -> ExitCode {
 }
 
 fn play(options: &Options) -> Result<bool> {
-    let at = |path: &Path, error: std::io::Error| format!("{}: {error}", path.display());
-    std::fs::create_dir_all(&options.out).map_err(|error| at(&options.out, error))?;
-    let (mut app, renders) = build(options);
-    let photographer = renders.then(|| hire(&mut app, options)).transpose()?;
+    std::fs::create_dir_all(&options.out).map_err(|error| format!("{}: {error}", options.out.display()))?;
+    let (mut app, photographer) = headless_app::build((options.width, options.height), |app| {
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
+        crate::game(app, options);
+    })?;
     // Time stands still until there is ground to walk on.
     wait_until(&mut app, |app| {
         app.update();
@@ -92,40 +93,8 @@ fn play(options: &Options) -> Result<bool> {
         "polygons": tiles.islands().map(|(.., polygons)| polygons.len()).sum::<usize>(),
         "bytes_of_polygons": tiles.bytes(),
         "longest_frame_ms": longest.as_secs_f32() * 1e3,
-        "drawn": renders,
+        "drawn": photographer.is_some(),
     });
-    let text = serde_json::to_string_pretty(&report)?;
-    println!("{text}");
-    let path = options.out.join("report.json");
-    std::fs::write(&path, text).map_err(|error| at(&path, error))?;
+    headless_app::save_report(&report, &options.out)?;
     Ok(arrived == COUNT && stopped > 0 && in_tunnel > 0)
-}
-
-fn build(options: &Options) -> (App, bool) {
-    let renderer = offscreen::find_renderer();
-    let renders = renderer.is_some();
-    if !renders {
-        println!("no graphics adapter: there will be no pictures");
-    }
-    let mut app = offscreen::build(renderer, |app| {
-        app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
-        crate::game(app, options);
-    });
-    app.update();
-    (app, renders)
-}
-
-/// Makes the camera draw into a picture, on request.
-fn hire(app: &mut App, options: &Options) -> Result<Photographer> {
-    let world = app.world_mut();
-    let camera = world.query_filtered::<Entity, With<Camera3d>>().single(world)?;
-    Ok(Photographer::new(app, camera, (options.width, options.height)))
-}
-
-/// Takes a picture. Time stands still meanwhile.
-fn shoot(app: &mut App, photographer: &Photographer, path: &Path) -> Result {
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::ZERO));
-    let shot = photographer.shoot(app, path);
-    app.insert_resource(TimeUpdateStrategy::ManualDuration(FRAME));
-    shot
 }

@@ -21,10 +21,8 @@
 mod display;
 mod figures;
 mod headless;
-#[path = "../shared/offscreen.rs"]
-mod offscreen;
-#[path = "../shared/photo.rs"]
-mod photo;
+#[path = "../shared/mouse.rs"]
+mod mouse;
 mod scene;
 mod story;
 
@@ -68,7 +66,7 @@ fn main() -> ExitCode {
     let mut app = App::new();
     app.add_plugins((DefaultPlugins, FreeCameraPlugin));
     game(&mut app, &options);
-    app.add_systems(Update, (scene::use_mouse, scene::press_keys).before(BurrowSystems::Collect));
+    app.add_systems(Update, (mouse::use_mouse::<3>, scene::press_keys).before(BurrowSystems::Collect));
     app.run().report()
 }
 

@@ -20,10 +20,8 @@
 #[path = "../shared/display.rs"]
 mod display;
 mod headless;
-#[path = "../shared/offscreen.rs"]
-mod offscreen;
-#[path = "../shared/photo.rs"]
-mod photo;
+#[path = "../shared/mouse.rs"]
+mod mouse;
 mod rain;
 mod scene;
 
@@ -74,7 +72,7 @@ fn main() -> ExitCode {
     let mut app = App::new();
     app.add_plugins((DefaultPlugins, FreeCameraPlugin));
     game(&mut app, &options);
-    app.add_systems(Update, (scene::use_mouse, scene::press_keys).before(BurrowSystems::Collect));
+    app.add_systems(Update, (mouse::use_mouse::<4>, scene::press_keys).before(BurrowSystems::Collect));
     app.run().report()
 }
 

@@ -45,3 +45,97 @@ pub(super) fn follow_commits(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+    use std::time::{Duration, Instant};
+
+    use bevy::mesh::MeshPlugin;
+    use bevy_landmass::prelude::{Archipelago3d, Landmass3dPlugin};
+
+    use super::*;
+    use crate::BurrowPlugins;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::Ground;
+    use crate::navigation::{WalkSettings, WalkableTile};
+    use crate::paths::{NavigationArea, NavigationPlugin, archipelago_options};
+    use crate::plugin::BurrowSettings;
+    use crate::terrain::TerrainSettings;
+
+    /// A dig in the middle of the tile with this number along x and z.
+    fn dig(tile: i32) -> Brush {
+        let middle = tile as f32 * 32.0 + 16.0;
+        Brush::dig(Shape::sphere(Vec3::new(middle, 10.0, middle), 3.0))
+    }
+
+    /// An app with level ground of 5 x 5 tiles, all of which are loaded: the terrain and its navigation.
+    fn app() -> (App, [Entity; 2]) {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
+            .add_plugins(Landmass3dPlugin::default().in_schedule(PreUpdate))
+            .add_plugins((BurrowPlugins, NavigationPlugin { wait: Duration::from_secs(60) }));
+        app.finish();
+        app.cleanup();
+        let agent = WalkSettings::default();
+        let archipelago = app.world_mut().spawn(Archipelago3d::new(archipelago_options(&agent, 1.0))).id();
+        let ground = Ground::flat(160, 160, 10.0).expect("valid ground");
+        let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
+        let terrain = app.world_mut().spawn(terrain).id();
+        let area = NavigationArea::Everywhere;
+        let navigation = app.world_mut().spawn(Navigation { terrain, archipelago, agent, area }).id();
+        run_until(&mut app, |app| {
+            let tiles = tiles(app, navigation);
+            tiles.len() == 25 && !tiles.is_loading() && !tiles.is_building()
+        });
+        (app, [terrain, navigation])
+    }
+
+    fn run_until(app: &mut App, is_so: impl Fn(&App) -> bool) {
+        let start = Instant::now();
+        while !is_so(app) {
+            assert!(start.elapsed() < Duration::from_secs(60), "it never came");
+            app.update();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn tiles(app: &App, navigation: Entity) -> &NavigationTiles {
+        app.world().get(navigation).expect("`Navigation` requires it")
+    }
+
+    /// The number of the build that made each tile.
+    fn builds(app: &App, navigation: Entity) -> BTreeMap<NavTilePos, u64> {
+        tiles(app, navigation).tiles.iter().map(|(&pos, tile)| (pos, tile.build)).collect()
+    }
+
+    #[test]
+    fn after_two_commits_in_one_frame_only_tiles_near_them_are_built_again() {
+        let (mut app, [terrain, navigation]) = app();
+        let before = builds(&app, navigation);
+        // The first dig is committed in the frame after its own, in which the second begins and ends.
+        for (tile, seconds) in [(0, 0), (3, 60)] {
+            let same_frame = Duration::from_secs(seconds);
+            app.world_mut().resource_mut::<BurrowSettings>().same_frame = same_frame;
+            app.world_mut().write_message(dig(tile)).expect("the plugin added it");
+            app.update();
+        }
+        let model = |app: &App| app.world().get::<Terrain>(terrain).expect("it is there");
+        run_until(&mut app, |app| model(app).world().revision() > 0);
+        assert_eq!(model(&app).world().revision(), 2, "both are committed in one frame");
+        run_until(&mut app, |app| !tiles(app, navigation).is_building());
+        let rebuilt: Vec<NavTilePos> = builds(&app, navigation)
+            .into_iter()
+            .filter(|(pos, build)| before[pos] != *build)
+            .map(|(pos, _)| pos)
+            .collect();
+        assert_eq!(rebuilt, [0, 3].map(|at| NavTilePos { x: at, z: at }));
+        // All tiles are those of the ground with both digs.
+        let tiles = tiles(&app, navigation);
+        let walker = tiles.walker.as_ref().expect("valid settings");
+        for (&pos, tile) in &tiles.tiles {
+            let polygons = WalkableTile::new(model(&app).world(), pos, walker).polygons();
+            assert_eq!(tile.polygons.as_deref(), Some(&polygons), "{pos:?}");
+        }
+    }
+}

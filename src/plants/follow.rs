@@ -70,3 +70,98 @@ pub(super) fn follow_commits(
         messages.tell((*terrain, world), &place, patches.scatter(), changes, news);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::time::{Duration, Instant};
+
+    use bevy::mesh::MeshPlugin;
+
+    use super::*;
+    use crate::BurrowPlugins;
+    use crate::brush::{Brush, Shape};
+    use crate::ground::Ground;
+    use crate::plants::{PlantSource, Plants, PlantsPlugin};
+    use crate::plugin::BurrowSettings;
+    use crate::scatter::{PatchPos, ScatterRules, Species, ViewDistances};
+    use crate::terrain::TerrainSettings;
+
+    /// Level ground of 6 x 6 patches.
+    fn level() -> Terrain {
+        let ground = Ground::flat(96, 96, 20.0).expect("valid ground");
+        Terrain::new(ground, &TerrainSettings::default()).expect("valid settings")
+    }
+
+    /// A dig in the patch with this number along x and z.
+    fn dig(patch: i32) -> Brush {
+        let middle = patch as f32 * 16.0 + 8.0;
+        Brush::dig(Shape::sphere(Vec3::new(middle, 20.0, middle), 3.0))
+    }
+
+    /// An app with a terrain all of whose grass is loaded.
+    fn app() -> (App, Entity) {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
+            .add_plugins((BurrowPlugins, PlantsPlugin));
+        app.finish();
+        app.cleanup();
+        app.world_mut().spawn((PlantSource { radius: 90.0 }, Transform::from_xyz(48.0, 20.0, 48.0)));
+        let view = ViewDistances { end: 60.0, ..default() };
+        let rules = ScatterRules { seed: 1, species: vec![Species { view, ..Species::named("grass") }] };
+        let terrain = app.world_mut().spawn((level(), Plants(rules))).id();
+        run_until(&mut app, |app| {
+            let patches = shown(app, terrain).patches();
+            patches.is_some_and(|patches| patches.len() == 36) && !shown(app, terrain).is_loading()
+        });
+        (app, terrain)
+    }
+
+    fn run_until(app: &mut App, is_so: impl Fn(&App) -> bool) {
+        let start = Instant::now();
+        while !is_so(app) {
+            assert!(start.elapsed() < Duration::from_secs(60), "it never came");
+            app.update();
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn shown(app: &App, terrain: Entity) -> &ShownPlants {
+        app.world().get(terrain).expect("`Plants` requires it")
+    }
+
+    /// Plants that do not stand in the patch with this number along x and z.
+    fn gone(app: &App, terrain: Entity, patch: i32) -> usize {
+        let patches = shown(app, terrain).patches().expect("valid rules");
+        patches.get(PatchPos { species: 0, x: patch, z: patch }).expect("it is loaded").gone_count()
+    }
+
+    #[test]
+    fn after_two_commits_in_one_frame_only_plants_near_them_are_looked_at_again() {
+        let (mut app, terrain) = app();
+        // A patch far away says of plants that they are gone, which is wrong until something looks at them again.
+        let mut dug = level();
+        dug.apply([dig(5)]);
+        let far = PatchPos { species: 0, x: 5, z: 5 };
+        let mut plants = app.world_mut().get_mut::<ShownPlants>(terrain).expect("`Plants` requires it");
+        let patches = plants.patches.as_mut().expect("valid rules");
+        let in_far = patches.scatter().patch(dug.world().ground(), far);
+        patches.insert(dug.world(), far, in_far);
+        let wrong = gone(&app, terrain, 5);
+        assert!(wrong > 0);
+        // The first dig is committed in the frame after its own, in which the second begins and ends.
+        for (patch, seconds) in [(1, 0), (3, 60)] {
+            let same_frame = Duration::from_secs(seconds);
+            app.world_mut().resource_mut::<BurrowSettings>().same_frame = same_frame;
+            app.world_mut().write_message(dig(patch)).expect("the plugin added it");
+            app.update();
+        }
+        let revision =
+            |app: &App| app.world().get::<Terrain>(terrain).expect("it is there").world().revision();
+        run_until(&mut app, |app| revision(app) > 0);
+        assert_eq!(revision(&app), 2, "both are committed in one frame");
+        assert!(gone(&app, terrain, 1) > 0 && gone(&app, terrain, 3) > 0);
+        (0..3).for_each(|_| app.update());
+        assert_eq!(gone(&app, terrain, 5), wrong);
+        assert_eq!(gone(&app, terrain, 0) + gone(&app, terrain, 4), 0);
+    }
+}

@@ -13,7 +13,7 @@ use image::RgbImage;
 use crate::album::{Album, keep};
 use crate::own_textures::set_textures;
 use crate::studio::{SIZE, Studio};
-use crate::truth::{COLORS, flat};
+use crate::truth::{COLORS, draw_flat};
 
 /// Voxels along the picture's side, and pixels of a voxel.
 const VOXELS: u32 = 64;
@@ -37,13 +37,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     let ground =
         Ground::from_noise(VOXELS, VOXELS, &noise).and_then(|ground| ground.with_material_fn(1, rings));
     studio.terrain(ground.expect("valid ground"), GroundLook { variety: 0.0, ..default() });
-    let own = studio.app.world().resource::<GroundTextures>().clone();
-    let textures = flat(studio);
-    set_textures(studio, textures);
-    let mut materials = studio.app.world_mut().resource_mut::<Assets<GroundMaterial>>();
-    for (_, material) in materials.iter_mut() {
-        material.base.unlit = true;
-    }
+    let own = draw_flat(studio);
     let side = VOXELS * PIXELS;
     studio.resize((side, side));
     let middle = Vec3::new(middle, 0.0, middle);

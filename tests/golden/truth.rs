@@ -53,13 +53,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
         Brush::dig(Shape::capsule(Vec3::new(30.0, top - 4.0, 30.0), Vec3::new(60.0, top - 24.0, 52.0), 6.0)),
         Brush::dig(Shape::cuboid(Vec3::new(48.0, top, 66.0), Vec3::new(40.0, 30.0, 4.0))),
     ]);
-    let own = studio.app.world().resource::<GroundTextures>().clone();
-    let textures = flat(studio);
-    set_textures(studio, textures);
-    let mut materials = studio.app.world_mut().resource_mut::<Assets<GroundMaterial>>();
-    for (_, material) in materials.iter_mut() {
-        material.base.unlit = true;
-    }
+    let own = draw_flat(studio);
     let camera = studio.camera;
     let fog = studio.app.world_mut().entity_mut(camera).take::<DistanceFog>();
     studio.app.world_mut().entity_mut(camera).insert(Tonemapping::None);
@@ -86,8 +80,20 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     set_textures(studio, own);
 }
 
+/// Draws all ground unlit and in flat colours, and returns the textures of before.
+pub fn draw_flat(studio: &mut Studio) -> GroundTextures {
+    let own = studio.app.world().resource::<GroundTextures>().clone();
+    let textures = flat(studio);
+    set_textures(studio, textures);
+    let mut materials = studio.app.world_mut().resource_mut::<Assets<GroundMaterial>>();
+    for (_, material) in materials.iter_mut() {
+        material.base.unlit = true;
+    }
+    own
+}
+
 /// A flat colour for each layer.
-pub fn flat(studio: &mut Studio) -> GroundTextures {
+fn flat(studio: &mut Studio) -> GroundTextures {
     let size = Extent3d { width: 4, height: 4, ..default() };
     let (format, usage) = (TextureFormat::Rgba8UnormSrgb, RenderAssetUsages::default());
     let layer = |[r, g, b]: [u8; 3]| GroundLayerImages {

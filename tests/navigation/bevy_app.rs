@@ -222,6 +222,40 @@ fn a_path_through_a_tunnel_exists_in_the_frame_after_the_commit() {
 }
 
 #[test]
+fn a_path_through_a_tunnel_that_two_commits_of_one_frame_dig_exists_in_the_next_frame() {
+    let (mut app, [terrain, archipelago, navigation]) = app(false, AGENT);
+    let walker = Walker::new(&AGENT).expect("valid");
+    for turn in 0..3 {
+        let x = 20.0 + 28.0 * turn as f32;
+        let part = |from, to| {
+            let ends = [from, to].map(|z| Vec3::new(x, 12.0, z));
+            Brush::dig(Shape::capsule(ends[0], ends[1], 3.5))
+        };
+        let revision = |app: &App| app.world().get::<Terrain>(terrain).expect("it").world().revision();
+        let before = revision(&app);
+        // The first half is committed in the frame after its own, in which the second one begins and ends.
+        for (half, seconds) in [(part(36.0, 48.0), 0), (part(48.0, 60.0), 60)] {
+            app.world_mut().resource_mut::<BurrowSettings>().same_frame = Duration::from_secs(seconds);
+            send(half)(&mut app);
+            app.update();
+        }
+        wait(&mut app, |world| world.get::<Terrain>(terrain).expect("it").world().revision() > before);
+        assert_eq!(revision(&app), before + 2, "both are committed in one frame");
+        app.update();
+        let [south, north] = [SOUTH, NORTH].map(|at| Vec3 { x, ..at });
+        assert!(has_path(&app, archipelago, south, north), "through tunnel {turn}");
+        let world = app.world().get::<Terrain>(terrain).expect("a terrain").world();
+        for (pos, _, polygons) in tiles(app.world(), navigation).islands() {
+            assert_eq!(*polygons, WalkableTile::new(world, pos, &walker).polygons(), "turn {turn}");
+        }
+        commit(&mut app, terrain, send(Undo { terrain: Some(terrain) }));
+        commit(&mut app, terrain, send(Undo { terrain: Some(terrain) }));
+        app.update();
+        assert!(!has_path(&app, archipelago, south, north), "after undo");
+    }
+}
+
+#[test]
 fn agents_that_do_not_fit_have_no_path() {
     for agent in [WalkSettings { radius: 4.0, ..AGENT }, WalkSettings { height: 9.0, ..AGENT }] {
         let (mut app, [terrain, archipelago, _]) = app(true, agent);

@@ -7,23 +7,13 @@ use bevy_burrow::prelude::*;
 
 use crate::stage::{Stage, dig, level};
 
-#[derive(Resource, PartialEq)]
+#[derive(Resource, Clone, PartialEq)]
 struct Playing(bool);
 
 /// A stage whose plugin runs while the game is played.
 fn stage() -> Stage {
     let mut stage = Stage::drawing().recording::<HistoryMoved>();
-    stage.app.insert_resource(Playing(true)).configure_sets(
-        Update,
-        (
-            BurrowSystems::Load,
-            BurrowSystems::Collect,
-            BurrowSystems::Commit,
-            BurrowSystems::Begin,
-            BurrowSystems::Propagate,
-        )
-            .run_if(resource_equals(Playing(true))),
-    );
+    stage.run_while(Playing(true));
     stage
 }
 

@@ -27,6 +27,17 @@ fn stage_in(folder: &Path) -> Stage {
     stage
 }
 
+/// Loads an image that is valid.
+fn load(stage: &mut Stage, path: &'static str) -> Handle<HeightmapImage> {
+    let handle: Handle<HeightmapImage> = stage.app.world().resource::<AssetServer>().load(path);
+    stage.frames_until("the image is loaded", |stage| {
+        let state = stage.app.world().resource::<AssetServer>().load_state(&handle);
+        assert!(!matches!(state, LoadState::Failed(_)), "{state:?}");
+        stage.app.world().resource::<Assets<HeightmapImage>>().contains(&handle)
+    });
+    handle
+}
+
 /// A temporary folder that is removed when dropped.
 pub struct Folder(PathBuf);
 
@@ -61,13 +72,7 @@ pub fn png(image: image::DynamicImage) -> Vec<u8> {
 #[test]
 fn the_shipped_elevation_model_loads_as_an_asset_and_becomes_a_terrain() {
     let mut stage = stage_in(Path::new("assets"));
-    let handle: Handle<HeightmapImage> =
-        stage.app.world().resource::<AssetServer>().load("jacksboro_fault.png");
-    stage.frames_until("the image is loaded", |stage| {
-        let state = stage.app.world().resource::<AssetServer>().load_state(&handle);
-        assert!(!matches!(state, LoadState::Failed(_)), "{state:?}");
-        stage.app.world().resource::<Assets<HeightmapImage>>().contains(&handle)
-    });
+    let handle = load(&mut stage, "jacksboro_fault.png");
     let HeightmapImage(image) =
         stage.app.world().resource::<Assets<HeightmapImage>>().get(&handle).expect("loaded");
     let expected = worlds::real_image();
@@ -148,12 +153,7 @@ fn a_raw_file_loads_with_the_settings_of_its_meta_file() {
         )"#,
     );
     let mut stage = stage_in(&folder.0);
-    let handle: Handle<HeightmapImage> = stage.app.world().resource::<AssetServer>().load("heights.raw");
-    stage.frames_until("the image is loaded", |stage| {
-        let state = stage.app.world().resource::<AssetServer>().load_state(&handle);
-        assert!(!matches!(state, LoadState::Failed(_)), "{state:?}");
-        stage.app.world().resource::<Assets<HeightmapImage>>().contains(&handle)
-    });
+    let handle = load(&mut stage, "heights.raw");
     let HeightmapImage(image) =
         stage.app.world().resource::<Assets<HeightmapImage>>().get(&handle).expect("loaded");
     assert_eq!((image.width(), image.height(), image.samples()), (4, 3, &samples[..]));

@@ -9,7 +9,7 @@ use fastrand::Rng;
 use crate::stage::{Stage, dig};
 
 /// Mountains of 320 x 270 voxels, no multiple of a stride.
-fn mountains() -> Terrain {
+pub fn mountains() -> Terrain {
     let noise =
         NoiseHeights { seed: 9, octaves: 5, scale: 70.0, amplitude: 60.0, base: 0.0, ..Default::default() };
     let ground = Ground::from_noise(320, 270, &noise).expect("valid mountains");
@@ -17,7 +17,7 @@ fn mountains() -> Terrain {
 }
 
 /// Levels that change within some hundred metres.
-fn levels() -> LevelsOfDetail {
+pub fn levels() -> LevelsOfDetail {
     LevelsOfDetail { cell_pixels: 24.0, error_pixels: 1.0, ..default() }
 }
 

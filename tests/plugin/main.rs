@@ -39,6 +39,7 @@ mod replacing;
 mod same_frame;
 mod saved;
 mod saved_changes;
+mod saved_drawing;
 mod saved_lifecycle;
 mod saved_moments;
 #[cfg(feature = "replicon")]

@@ -46,7 +46,7 @@ struct Row {
     tiles: bool,
 }
 
-#[derive(Resource, PartialEq)]
+#[derive(Resource, Clone, PartialEq)]
 struct Playing(bool);
 
 fn stage() -> Stage {
@@ -62,21 +62,8 @@ fn stage() -> Stage {
     )
     .recording::<WorldSaved>()
     .recording::<PlantRemoved>();
-    stage
-        .app
-        .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 64.0)))
-        .insert_resource(Playing(true))
-        .configure_sets(
-            Update,
-            (
-                BurrowSystems::Load,
-                BurrowSystems::Collect,
-                BurrowSystems::Commit,
-                BurrowSystems::Begin,
-                BurrowSystems::Propagate,
-            )
-                .run_if(resource_equals(Playing(true))),
-        );
+    stage.app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / 64.0)));
+    stage.run_while(Playing(true));
     stage
 }
 

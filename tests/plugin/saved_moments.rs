@@ -2,9 +2,12 @@
 //! folder that its component names, nothing is held for ever, and no folder stays locked.
 #![cfg(feature = "store")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
+use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
+use bevy::window::WindowCloseRequested;
 use bevy_burrow::format::Level;
 use bevy_burrow::plugin::Held;
 use bevy_burrow::prelude::*;
@@ -366,5 +369,76 @@ fn an_app_that_ends_in_any_frame_of_opening_leaves_a_world_or_none() {
             exit(again);
             assert_eq!(hash_in(&folder.0, terrain()).map(|(_, hash)| hash), Ok(before));
         }
+    }
+}
+
+/// Stores the number of digs with the world, as a game stores what they yield.
+fn store_count(
+    mut applied: MessageReader<BrushApplied>,
+    mut count: Local<u8>,
+    mut worlds: Query<&mut WorldStore>,
+) {
+    *count += applied.read().count() as u8;
+    worlds.iter_mut().for_each(|mut world| world.put("digs", [*count]));
+}
+
+/// An app that ends with its window, with an open world: small digs are committed in their frame.
+fn with_window(path: &Path) -> App {
+    let mut game = App::new();
+    game.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
+        .add_plugins((WindowPlugin::default(), BurrowPlugins))
+        .add_systems(Update, store_count.after(BurrowSystems::Commit).before(SaveSystems));
+    listen(&mut game);
+    game.finish();
+    game.cleanup();
+    game.world_mut().resource_mut::<BurrowSettings>().same_frame = Duration::from_secs(60);
+    game.world_mut().spawn((terrain(), saved(path)));
+    run_until_opened(&mut game);
+    run_until_ready(&mut game);
+    game
+}
+
+#[test]
+fn a_dig_in_a_frame_in_which_the_window_closes_is_saved_with_what_the_game_stores_for_it_or_not_at_all() {
+    // The dig is in the last frame, or in the one before: that in which the close button is pressed.
+    for (is_despawned, exits, is_last) in [
+        (false, false, false),
+        (false, false, true),
+        (false, true, false),
+        (false, true, true),
+        (true, false, false),
+        (true, false, true),
+        (true, true, true),
+    ] {
+        let when = format!("despawned: {is_despawned}, exits: {exits}, last: {is_last}");
+        let folder = Folder::new("window");
+        let mut game = with_window(&folder.0);
+        let world = game.world_mut();
+        let window = world.query_filtered::<Entity, With<Window>>().single(world).expect("one window");
+        if !is_despawned {
+            world.write_message(WindowCloseRequested { window });
+        }
+        if !is_last {
+            dig(&mut game, 30.0);
+        }
+        game.update();
+        assert!(game.should_exit().is_none(), "{when}");
+        if is_last {
+            dig(&mut game, 30.0);
+        }
+        if exits {
+            game.world_mut().write_message(AppExit::Success);
+        }
+        if is_despawned {
+            game.world_mut().despawn(window);
+        }
+        game.update();
+        assert!(game.should_exit().is_some(), "{when}");
+        drop(game);
+        let (mut again, entity) = app(&folder.0);
+        run_until_opened(&mut again);
+        let digs = again.world().get::<WorldStore>(entity).expect("it is open").get("digs");
+        let digs = digs.map_or(0, |digs| u64::from(digs[0]));
+        assert_eq!((&heard(&again).opened, digs), (&vec![Ok(digs)], u64::from(!is_last)), "{when}");
     }
 }

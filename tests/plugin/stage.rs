@@ -119,6 +119,21 @@ impl Stage {
         self
     }
 
+    /// Inserts a resource, and makes the plugin's systems in `Update` run only while it has this value.
+    pub fn run_while<R: Resource + Clone + PartialEq>(&mut self, value: R) {
+        self.app.insert_resource(value.clone()).configure_sets(
+            Update,
+            (
+                BurrowSystems::Load,
+                BurrowSystems::Collect,
+                BurrowSystems::Commit,
+                BurrowSystems::Begin,
+                BurrowSystems::Propagate,
+            )
+                .run_if(resource_equals(value)),
+        );
+    }
+
     /// Makes each transaction end in a later frame than that in which it begins.
     pub fn without_waiting(mut self) -> Self {
         self.app.world_mut().resource_mut::<BurrowSettings>().same_frame = Duration::ZERO;

@@ -141,6 +141,34 @@ fn plants_go_in_the_frame_of_their_ground_and_return_with_it() {
 }
 
 #[test]
+fn plants_go_in_the_frame_of_two_commits_and_each_is_told_once() {
+    let (mut app, terrain) = app(false, ());
+    let before = standing(&app, terrain);
+    let revision = |app: &App| app.world().get::<Terrain>(terrain).expect("there").world().revision();
+    for turn in 0..4 {
+        let (at, first) = (Vec3::new(20.0 + 14.0 * turn as f32, 20.5, 30.0), revision(&app));
+        // The first is committed in the frame after its own, in which the second begins and ends. They overlap.
+        for (at, seconds) in [(at, 0), (at + Vec3::Z * 4.0, 60)] {
+            app.world_mut().resource_mut::<BurrowSettings>().same_frame = Duration::from_secs(seconds);
+            dig(&mut app, at, 3.5);
+            app.update();
+        }
+        wait(&mut app, |world| world.get::<Terrain>(terrain).expect("there").world().revision() > first);
+        assert_eq!(revision(&app), first + 2, "both are committed in one frame");
+        assert_up_to_date(&app, terrain, "in the frame of both");
+    }
+    (0..3).for_each(|_| app.update());
+    assert_up_to_date(&app, terrain, "later");
+    let now = standing(&app, terrain);
+    let mut told: Vec<Plant> =
+        app.world().resource::<Log>().removed.iter().map(|removed| removed.plant).collect();
+    told.sort_by_key(|plant| plant.id);
+    let gone: Vec<Plant> = before.into_iter().filter(|plant| !now.contains(plant)).collect();
+    assert!(gone.len() > 40 && app.world().resource::<Log>().returned.is_empty());
+    assert_eq!(told, gone);
+}
+
+#[test]
 fn a_game_removes_a_plant_with_a_brush() {
     let place = Transform::from_xyz(100.0, -8.0, 64.0);
     let (mut app, terrain) = app(false, place);

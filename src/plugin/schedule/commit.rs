@@ -189,11 +189,14 @@ pub(in crate::plugin) fn commit_begun(
     ticks: SystemChangeTick,
     exits: Option<Res<Messages<AppExit>>>,
     closing: Query<(), With<ClosingWindow>>,
+    mut closed: RemovedComponents<Window>,
 ) {
     let begun = same_frame.bypass_change_detection().take();
     let most = commits.settings.same_frame;
-    // A game that ends has no `Update` any more in which it could note what belongs to the edit.
-    let ends = exits.is_some_and(|exits| !exits.is_empty()) || !closing.is_empty();
+    // A game that ends has no `Update` any more in which it could note what belongs to the edit. Bevy ends it after this
+    // when its last window is closed, or despawned by the game.
+    let closes = !closing.is_empty() || closed.read().count() > 0;
+    let ends = closes || exits.is_some_and(|exits| !exits.is_empty());
     if begun.is_empty() || !commits.has_meshes() || most.is_zero() || ends {
         return;
     }

@@ -70,7 +70,7 @@ impl SurfaceProcessor for Slow {
     }
 }
 
-#[derive(Resource, PartialEq)]
+#[derive(Resource, Clone, PartialEq)]
 pub(super) struct Runs(pub(super) bool);
 
 /// An app in which things happen to a terrain.
@@ -121,31 +121,23 @@ impl Life {
     /// A life in an app that is changed before there is a terrain.
     pub(super) fn with(load: Load, seed: u64, change: impl FnOnce(&mut App)) -> Self {
         let mut stage = load.stage().recording::<HistoryMoved>();
-        // In half of the lives each transaction is committed in the frame in which it begins, where that may be.
-        if seed % 2 == 1 {
-            stage = stage.with_settings(BurrowSettings { same_frame: Duration::from_secs(60), ..default() });
-        }
         #[cfg(feature = "render")]
         stage.app.init_asset::<StandardMaterial>();
+        // In half of the lives each transaction is committed in the frame in which it begins, where that may be.
+        let same_frame = Duration::from_secs(if seed % 2 == 1 { 60 } else { 0 });
         stage
             .app
-            .insert_resource(BurrowSettings { loads_per_frame: 8, swaps_per_frame: 24, ..default() })
-            .insert_resource(Runs(true))
+            .insert_resource(BurrowSettings {
+                loads_per_frame: 8,
+                swaps_per_frame: 24,
+                same_frame,
+                ..default()
+            })
             .init_resource::<Lonely>()
             .add_observer(|new: On<Add, Tile>, parents: Query<&ChildOf>, mut lonely: ResMut<Lonely>| {
                 lonely.0 += usize::from(!parents.contains(new.entity));
-            })
-            .configure_sets(
-                Update,
-                (
-                    BurrowSystems::Load,
-                    BurrowSystems::Collect,
-                    BurrowSystems::Commit,
-                    BurrowSystems::Begin,
-                    BurrowSystems::Propagate,
-                )
-                    .run_if(resource_equals(Runs(true))),
-            );
+            });
+        stage.run_while(Runs(true));
         change(&mut stage.app);
         let mut rng = Rng::with_seed(seed);
         let place = Transform::from_xyz(20.0, 30.0, 20.0);
@@ -418,7 +410,11 @@ impl Life {
                 self.is_slow.store(true, Ordering::Relaxed);
                 self.dig();
                 self.dig();
+                // It is under way after this frame, however long others wait.
+                let world = self.stage.app.world_mut();
+                let waits = std::mem::take(&mut world.resource_mut::<BurrowSettings>().same_frame);
                 self.run(1);
+                self.stage.app.world_mut().resource_mut::<BurrowSettings>().same_frame = waits;
             }
             Phase::LevelChange => {
                 self.settle();
