@@ -130,7 +130,7 @@ pub(super) fn recover(
     Ok(recovered)
 }
 
-/// What a world is recovered from, and what is known of it before its regions are decoded.
+/// A world that is being recovered: its sources, and the facts that decide how, before any region is decoded.
 struct Recovery<'a> {
     contents: &'a Contents,
     ground: &'a Arc<Ground>,
@@ -339,8 +339,8 @@ impl<'a> Recovery<'a> {
         }
     }
 
-    /// The world of the checkpoint after the commits that follow it. `parts` are those that it was restored from. What is
-    /// not `is_checked` has to be saved anew.
+    /// Replays the commits after the checkpoint on a terrain that was restored from these parts. Unless `is_checked`,
+    /// commits are not compared with it, and the whole world counts as changed.
     fn replay_tail(
         &self,
         terrain: Terrain,
