@@ -89,7 +89,7 @@ pub(super) fn recover(
     recovery.check_base(options.base_changed)?;
     let is_same_base = recovery.is_same_base;
     if !is_same_base && options.base_changed == BaseChanged::Replay && recovery.is_contiguous {
-        let mut recovered = recovery.whole(recovery.replay_log(false)?);
+        let mut recovered = recovery.recovered_by_log(recovery.replay_log(false)?);
         recovered.findings.base_changed = Some((recovery.changed_regions(), "replayed"));
         return Ok(recovered);
     }
@@ -112,7 +112,7 @@ pub(super) fn recover(
         let replayed = recovery.replay_log(true)?;
         // Behind what can't be replayed, the checkpoint may know more.
         if replayed.frame >= recovery.checkpoint.frame {
-            let mut recovered = recovery.whole(replayed);
+            let mut recovered = recovery.recovered_by_log(replayed);
             recovered.is_log_whole = true;
             recovered.findings.damaged = damaged;
             return Ok(recovered);
@@ -324,7 +324,7 @@ impl<'a> Recovery<'a> {
     }
 
     /// A world that was replayed from its first commit.
-    fn whole(&self, replayed: Replayed) -> Recovered {
+    fn recovered_by_log(&self, replayed: Replayed) -> Recovered {
         Recovered {
             mirror: mirror_of(&replayed.terrain, replayed.game, self.level, &self.checkpoint),
             terrain: replayed.terrain,
