@@ -119,6 +119,19 @@ struct Drawing {
     layers: usize,
 }
 
+impl Drawing {
+    /// Whether it need not be drawn again: nothing has changed, or only the world has, a moment ago, and a game has
+    /// despawned none of its entities, of which there are `layers`.
+    fn is_current(&self, key: &Key, layers: usize, now: Duration, period: Duration) -> bool {
+        let old = &self.key;
+        let is_urgent = old.settings != key.settings
+            || old.fading != key.fading
+            || old.render_layers != key.render_layers;
+        let is_as_it_was = old == key || !is_urgent && now.saturating_sub(self.since) < period;
+        is_as_it_was && layers == self.layers
+    }
+}
+
 /// Draws views that are outdated, and removes those that are switched off.
 fn draw(
     mut commands: Commands,
@@ -151,23 +164,13 @@ fn draw(
     let now = time.map_or(Duration::ZERO, |time| time.elapsed());
     for (entity, terrain, own_place, render_layers, _) in terrains.iter().filter(|(.., seen)| seen.get()) {
         let Some(focus) = focus(&debug, terrain, own_place, &cameras) else { continue };
-        let scale = voxel_metres(own_place);
-        // Rounded, so that small moves of the camera draw nothing again.
-        let step = (debug.near / scale / 4.0).max(1.0);
-        let steps = (focus / step).round();
-        let place = Place {
-            focus: steps * step,
-            radius: debug.radius / scale,
-            near: debug.near / scale,
-            #[cfg(feature = "navigation")]
-            agent: debug.agent.scaled(1.0 / scale),
-        };
+        let (place, rounded) = place(&debug, focus, voxel_metres(own_place));
         for view in DebugView::ALL.into_iter().filter(|&view| debug.shows(view)) {
             let fading = if view == DebugView::Dirty { *frames } else { 0 };
             let key = Key {
                 version: terrain.world().version(),
                 cut: terrain.drawn_cut().filter(|_| view == DebugView::Levels).cloned(),
-                focus: steps.as_ivec3(),
+                focus: rounded,
                 settings: debug.clone(),
                 fading,
                 render_layers: render_layers.cloned(),
@@ -175,14 +178,9 @@ fn draw(
             let own =
                 shown.iter().filter(|(_, lines, parent)| lines.view == view && parent.parent() == entity);
             let own: Vec<Entity> = own.map(|(lines, ..)| lines).collect();
-            if let Some(Drawing { key: old, since, layers }) = drawn.get(&(entity, view)) {
-                let is_urgent = old.settings != key.settings
-                    || old.fading != key.fading
-                    || old.render_layers != key.render_layers;
-                let is_as_it_was = *old == key || !is_urgent && now.saturating_sub(*since) < period;
-                if is_as_it_was && own.len() == *layers {
-                    continue;
-                }
+            let is_current = |last: &Drawing| last.is_current(&key, own.len(), now, period);
+            if drawn.get(&(entity, view)).is_some_and(is_current) {
+                continue;
             }
             let fresh = fresh_bricks(&dirty, entity, &debug, now);
             let mut out = LineBuffer::new(debug.max_lines);
@@ -200,6 +198,21 @@ fn draw(
             }
         }
     }
+}
+
+/// What views are drawn around, in voxels of this many metres; with the focus in steps, as a key.
+fn place(debug: &BurrowDebug, focus: Vec3, scale: f32) -> (Place, IVec3) {
+    // Rounded, so that small moves of the camera draw nothing again.
+    let step = (debug.near / scale / 4.0).max(1.0);
+    let steps = (focus / step).round();
+    let place = Place {
+        focus: steps * step,
+        radius: debug.radius / scale,
+        near: debug.near / scale,
+        #[cfg(feature = "navigation")]
+        agent: debug.agent.scaled(1.0 / scale),
+    };
+    (place, steps.as_ivec3())
 }
 
 fn gizmo(layer: Layer, assets: &mut Assets<GizmoAsset>) -> Gizmo {

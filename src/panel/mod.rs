@@ -60,7 +60,10 @@ pub use state::{BurrowPanel, PanelAction, PanelPlaces};
 pub use tool::{BrushTool, PATH_POINTS, StampImage, ToolAlign, ToolModel, ToolPrefab, ToolShape};
 pub use tool_operation::ToolOperation;
 
+use std::path::PathBuf;
+
 use bevy::camera::RenderTarget;
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Color32, Id, LayerId, Order, ScrollArea, Ui, Vec2};
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPreUpdateSet, EguiPrimaryContextPass, PrimaryEguiContext};
@@ -165,22 +168,7 @@ fn perform_actions(
                     PanelAction::SaveLevel => files.target(&panel),
                     _ => panel.level.clone(),
                 };
-                if terrain.is_none() {
-                    files.forget_next();
-                }
-                let why = match &target {
-                    target if target.as_os_str().is_empty() => Some(texts::NO_FOLDER),
-                    target if target.is_file() => Some(texts::PACKED_FILE),
-                    _ => None,
-                };
-                if let Some(why) = why {
-                    files.forget_next();
-                    panel.report(Err(why.into()));
-                    continue;
-                }
-                terrain.into_iter().for_each(|own| {
-                    level::save(&mut commands, (&mut *panel, &mut *files), own, target.clone())
-                });
+                save_level(&mut commands, &mut panel, &mut files, terrain, target);
             }
             Some(PanelAction::LoadLevel) if panel.level.as_os_str().is_empty() => {
                 panel.report(Err(texts::NO_FOLDER.into()));
@@ -204,6 +192,30 @@ fn perform_actions(
                 | PanelAction::ReleaseBrush,
             ) => {}
         }
+    }
+}
+
+/// Saves the level of a terrain in a folder. An empty path and a packed file are refused.
+fn save_level(
+    commands: &mut Commands,
+    panel: &mut ResMut<BurrowPanel>,
+    files: &mut ResMut<Files>,
+    terrain: Option<(Entity, &Terrain)>,
+    target: PathBuf,
+) {
+    if terrain.is_none() {
+        files.forget_next();
+    }
+    let why = match &target {
+        target if target.as_os_str().is_empty() => Some(texts::NO_FOLDER),
+        target if target.is_file() => Some(texts::PACKED_FILE),
+        _ => None,
+    };
+    if let Some(why) = why {
+        files.forget_next();
+        panel.report(Err(why.into()));
+    } else if let Some(terrain) = terrain {
+        level::save(commands, (&mut **panel, &mut **files), terrain, target);
     }
 }
 
@@ -250,6 +262,66 @@ fn forget_note(
     }
 }
 
+/// The terrains, and what the panel shows of them.
+#[derive(SystemParam)]
+struct Terrains<'w, 's> {
+    terrains: Query<'w, 's, (Entity, &'static Terrain)>,
+    parts: Query<
+        'w,
+        's,
+        (
+            Option<&'static Name>,
+            Option<&'static MaterialColors>,
+            Option<&'static LooseSettings>,
+            Option<&'static GroundLook>,
+        ),
+    >,
+    #[cfg(feature = "scatter")]
+    plants: Query<'w, 's, (&'static crate::plants::Plants, &'static crate::plants::ShownPlants)>,
+}
+
+impl Terrains<'_, '_> {
+    /// A line for each terrain, by entity.
+    fn lines(&self) -> Vec<TerrainLine<'_>> {
+        let line = |(entity, terrain)| {
+            let name = self.parts.get(entity).ok().and_then(|(name, ..)| name);
+            let name = name.map_or_else(|| format!("Terrain {entity}"), |name| name.to_string());
+            TerrainLine { entity, name, terrain }
+        };
+        let mut lines: Vec<TerrainLine> = self.terrains.iter().map(line).collect();
+        lines.sort_unstable_by_key(|line| line.entity);
+        lines
+    }
+
+    /// The material colours of the chosen terrain.
+    fn colors(&self, chosen: Option<Entity>) -> MaterialColors {
+        let part = chosen.and_then(|entity| self.parts.get(entity).ok());
+        part.and_then(|(_, colors, ..)| colors.cloned()).unwrap_or_default()
+    }
+
+    /// The settings of the chosen terrain.
+    fn controls(&self, chosen: Option<Entity>) -> TerrainControls {
+        let part = chosen.and_then(|entity| self.parts.get(entity).ok());
+        let (loose, look) = part.map_or((None, None), |(_, _, loose, look)| (loose, look));
+        let terrain = chosen.and_then(|entity| self.terrains.get(entity).ok());
+        let controls = terrain.map(|(_, terrain)| TerrainControls::of(terrain, loose, look));
+        TerrainControls {
+            #[cfg(feature = "scatter")]
+            plants: self.plants(chosen).map(|(crate::plants::Plants(rules), _)| rules.clone()),
+            ..controls.unwrap_or_default()
+        }
+    }
+
+    /// The plants of the chosen terrain: their rules, and those that are shown.
+    #[cfg(feature = "scatter")]
+    fn plants(
+        &self,
+        chosen: Option<Entity>,
+    ) -> Option<(&crate::plants::Plants, &crate::plants::ShownPlants)> {
+        chosen.and_then(|entity| self.plants.get(entity).ok())
+    }
+}
+
 /// Draws both columns.
 fn draw(
     mut contexts: EguiContexts,
@@ -259,10 +331,8 @@ fn draw(
     figures: Res<BurrowFigures>,
     survey: Res<Survey>,
     mut files: ResMut<Files>,
-    terrains: Query<(Entity, &Terrain)>,
-    parts: Query<(Option<&Name>, Option<&MaterialColors>, Option<&LooseSettings>, Option<&GroundLook>)>,
+    terrains: Terrains,
     mut places: ResMut<PanelPlaces>,
-    #[cfg(feature = "scatter")] plants: Query<(&crate::plants::Plants, &crate::plants::ShownPlants)>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,
     mut commands: Commands,
@@ -278,29 +348,10 @@ fn draw(
         return;
     }
     let was_typing = context.text_edit_focused();
-    let chosen = survey::chosen(&panel, &terrains);
-    let part = chosen.and_then(|entity| parts.get(entity).ok());
-    let materials = materials(&panel, &part.and_then(|(_, colors, ..)| colors.cloned()).unwrap_or_default());
-    let controls = chosen.and_then(|entity| terrains.get(entity).ok()).map_or_else(
-        TerrainControls::default,
-        |(_, terrain)| {
-            TerrainControls::of(terrain, part.and_then(|part| part.2), part.and_then(|part| part.3))
-        },
-    );
-    #[cfg(feature = "scatter")]
-    let plants = chosen.and_then(|entity| plants.get(entity).ok());
-    #[cfg(feature = "scatter")]
-    let controls =
-        TerrainControls { plants: plants.map(|(crate::plants::Plants(rules), _)| rules.clone()), ..controls };
-    let mut lines: Vec<TerrainLine> = terrains
-        .iter()
-        .map(|(entity, terrain)| {
-            let name = parts.get(entity).ok().and_then(|(name, ..)| name);
-            let name = name.map_or_else(|| format!("Terrain {entity}"), |name| name.to_string());
-            TerrainLine { entity, name, terrain }
-        })
-        .collect();
-    lines.sort_unstable_by_key(|line| line.entity);
+    let chosen = survey::chosen(&panel, &terrains.terrains);
+    let materials = materials(&panel, &terrains.colors(chosen));
+    let controls = terrains.controls(chosen);
+    let lines = terrains.lines();
     let voxel = voxel_size(&lines, chosen);
 
     let (mut new_tool, mut new_panel, mut new_settings) = (tool.clone(), panel.clone(), settings.clone());
@@ -314,18 +365,13 @@ fn draw(
         settings: &mut new_settings,
         controls: &mut new_controls,
         #[cfg(feature = "scatter")]
-        plants: plants.map(|(_, shown)| shown),
+        plants: terrains.plants(chosen).map(|(_, shown)| shown),
         materials: &materials,
         actions: &mut pressed,
     };
     fold_one(context, panel.shows_brush && panel.shows_world);
     if panel.shows_brush {
-        let head = |ui: &mut Ui, content: &mut Content| {
-            brush_column::head(ui, &panel, &tool, chosen.is_some(), content.actions);
-        };
-        column(context, BRUSH, Align2::LEFT_TOP, texts::BRUSH, &mut content, head, |ui, _| {
-            brush_column::show(ui, &mut new_tool, &materials, voxel, &panel);
-        });
+        draw_brush(context, &panel, (&tool, &mut new_tool), voxel, &mut content);
     }
     if panel.shows_world {
         let mut both = (&mut new_panel, &mut content);
@@ -352,6 +398,22 @@ fn draw(
         new_controls.apply(&controls, entity, &mut commands);
     }
     actions.write_batch(pressed);
+}
+
+/// Draws the column of the brush.
+fn draw_brush(
+    context: &egui::Context,
+    panel: &BurrowPanel,
+    (tool, new_tool): (&BrushTool, &mut BrushTool),
+    voxel: f32,
+    content: &mut Content,
+) {
+    let head = |ui: &mut Ui, content: &mut Content| {
+        brush_column::head(ui, panel, tool, content.chosen.is_some(), content.actions);
+    };
+    column(context, BRUSH, Align2::LEFT_TOP, texts::BRUSH, content, head, |ui, content| {
+        brush_column::show(ui, new_tool, content.materials, voxel, panel);
+    });
 }
 
 /// Shows a failure or running work where the column that has the message is not in sight; returns whether it was

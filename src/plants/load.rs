@@ -10,7 +10,7 @@ use super::follow::PlantMessages;
 use super::{News, PlantSource, Plants, ShownPlants};
 use crate::plugin::{Places, Squares, TerrainEntities, are_same, position_on, voxel_metres};
 use crate::scatter::{PatchPos, Plant, PlantPatches, Scatter};
-use crate::terrain::Terrain;
+use crate::terrain::{Terrain, World as TerrainWorld};
 use crate::threads::{ThreadTask, Threads, free_later};
 
 /// The most cells whose patches one task makes.
@@ -68,6 +68,36 @@ impl ShownPlants {
         (self.task, self.version, self.is_settled) = (None, None, false);
         self.news.push(News::Cleared);
     }
+
+    /// Drops patches that no viewer is near to, and starts to make those that are missing.
+    fn load_around(&mut self, viewers: Vec<Viewer>, world: &TerrainWorld) {
+        let Some(patches) = &mut self.patches else { return };
+        let scatter = Arc::clone(patches.scatter());
+        let near = near(&scatter, (world.ground().width(), world.ground().depth()), &viewers);
+        self.viewers = viewers;
+        let far: Vec<PatchPos> =
+            patches.iter().map(|(pos, _)| pos).filter(|pos| !near.kept.contains(pos)).collect();
+        for pos in far {
+            free_later(patches.remove(pos));
+            self.news.push(News::Unloaded(pos));
+        }
+        let missing = near.wanted(|pos| patches.get(pos).is_none());
+        self.is_settled = missing.is_empty();
+        if self.is_settled {
+            return;
+        }
+        let mut cells = 0;
+        let first = missing.into_iter().take_while(|pos| {
+            let fits = cells < CELLS;
+            cells += scatter.patch_size(pos.species).pow(2);
+            fits
+        });
+        // Not a snapshot of the world: digs would have to copy its index meanwhile.
+        let (first, ground): (Vec<PatchPos>, _) = (first.collect(), world.shared_ground());
+        self.task = Some(LoadTask(ThreadTask::start(Threads::Background, move || {
+            first.into_iter().map(|pos| (pos, scatter.patch(&ground, pos))).collect()
+        })));
+    }
 }
 
 /// Loads patches that cameras and sources are near to, and drops those that none is near to.
@@ -116,31 +146,7 @@ pub(super) fn choose_patches(
         if shown.is_settled && are_same(&shown.viewers, &viewers) {
             continue;
         }
-        shown.viewers.clone_from(&viewers);
-        let scatter = Arc::clone(patches.scatter());
-        let near = near(&scatter, (world.ground().width(), world.ground().depth()), &viewers);
-        let far: Vec<PatchPos> =
-            patches.iter().map(|(pos, _)| pos).filter(|pos| !near.kept.contains(pos)).collect();
-        for pos in far {
-            free_later(patches.remove(pos));
-            shown.news.push(News::Unloaded(pos));
-        }
-        let missing = near.wanted(|pos| patches.get(pos).is_none());
-        shown.is_settled = missing.is_empty();
-        if shown.is_settled {
-            continue;
-        }
-        let mut cells = 0;
-        let first = missing.into_iter().take_while(|pos| {
-            let fits = cells < CELLS;
-            cells += scatter.patch_size(pos.species).pow(2);
-            fits
-        });
-        // Not a snapshot of the world: digs would have to copy its index meanwhile.
-        let (first, ground): (Vec<PatchPos>, _) = (first.collect(), world.shared_ground());
-        shown.task = Some(LoadTask(ThreadTask::start(Threads::Background, move || {
-            first.into_iter().map(|pos| (pos, scatter.patch(&ground, pos))).collect()
-        })));
+        shown.load_around(viewers, world);
     }
 }
 

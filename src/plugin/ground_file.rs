@@ -326,25 +326,19 @@ fn follow_ground_files(
             }
             refused.insert(entity, reason);
         }
-        let Some(GroundAsset { ground, report }) = grounds.get(&from.ground) else { continue };
+        let Some(asset) = grounds.get(&from.ground) else { continue };
+        let GroundAsset { ground, report } = asset;
         let hash = ground.hash();
         let Some(mut terrain) = terrain else {
             if last_failed.get(&entity) == Some(&hash) {
                 failed.insert(entity, hash);
                 continue;
             }
-            match Terrain::new(Arc::clone(ground), &from.settings) {
-                Ok(terrain) => {
-                    info!("{report}");
-                    commands.entity(entity).try_insert(terrain);
-                    tell(Ok(report.clone()));
-                }
-                Err(error) => {
-                    error!("no terrain can be made from the ground of {entity}: {error}");
-                    failed.insert(entity, hash);
-                    tell(Err(error.to_string()));
-                }
+            let outcome = make_terrain(&mut commands, entity, from, asset);
+            if outcome.is_err() {
+                failed.insert(entity, hash);
             }
+            tell(outcome);
             continue;
         };
         // The ground of a client is its server's.
@@ -353,13 +347,7 @@ fn follow_ground_files(
         }
         let model = terrain.bypass_change_detection();
         let before = model.world().ground();
-        let size = |ground: &Ground| (ground.width(), ground.depth());
-        if size(before) != size(ground) {
-            let ((width, depth), (new_width, new_depth)) = (size(before), size(ground));
-            let error = format!(
-                "the file of the ground of {entity} has {new_width} x {new_depth} cells now, and the terrain {width} x {depth}: \
-                 despawn it and spawn another one to show the file"
-            );
+        if let Some(error) = misfit(entity, before, ground) {
             error!("{error}");
             tell(Err(error));
         } else if followed.is_some() || before.hash() != hash {
@@ -374,4 +362,36 @@ fn follow_ground_files(
         }
         commands.entity(entity).try_insert(FollowedGround(hash));
     }
+}
+
+/// Makes a terrain of a ground, and returns what to report.
+fn make_terrain(
+    commands: &mut Commands,
+    entity: Entity,
+    from: &GroundFrom,
+    GroundAsset { ground, report }: &GroundAsset,
+) -> Result<String, String> {
+    match Terrain::new(Arc::clone(ground), &from.settings) {
+        Ok(terrain) => {
+            info!("{report}");
+            commands.entity(entity).try_insert(terrain);
+            Ok(report.clone())
+        }
+        Err(error) => {
+            error!("no terrain can be made from the ground of {entity}: {error}");
+            Err(error.to_string())
+        }
+    }
+}
+
+/// Why a terrain can't get another ground, if that has another size.
+fn misfit(entity: Entity, before: &Ground, now: &Ground) -> Option<String> {
+    let size = |ground: &Ground| (ground.width(), ground.depth());
+    (size(before) != size(now)).then(|| {
+        let ((width, depth), (new_width, new_depth)) = (size(before), size(now));
+        format!(
+            "the file of the ground of {entity} has {new_width} x {new_depth} cells now, and the terrain {width} x {depth}: \
+             despawn it and spawn another one to show the file"
+        )
+    })
 }

@@ -171,69 +171,10 @@ pub struct TerrainPlugin;
 
 impl Plugin for TerrainPlugin {
     fn build(&self, app: &mut App) {
-        app.init_resource::<BurrowSettings>()
-            .init_resource::<BurrowFigures>()
-            .init_resource::<BurrowEngine>()
-            .init_resource::<ThreadSettings>()
-            .init_resource::<task::TaskCounter>()
-            .init_resource::<SurfaceProcessors>()
-            .init_resource::<inbox::Inbox>()
-            .init_resource::<reports::Reported>()
-            .init_resource::<same_frame::SameFrame>()
-            .init_resource::<WantedTiles>()
-            .add_message::<Brush>()
-            .register_type::<Brush>()
-            .register_type_data::<Brush, ReflectMessage>()
-            .add_message::<TargetedBrush>()
-            .add_message::<BrushApplied>()
-            .add_message::<Undo>()
-            .add_message::<Redo>()
-            .add_message::<HistoryMoved>()
-            .add_message::<LoosePieceFound>()
-            .add_message::<LoosePieceReturned>()
-            .add_observer(outdated::prepare_new)
-            .add_observer(collect::free_history)
-            .add_observer(collect::answer_removed)
-            .add_observer(collect::enable_loose_search)
-            .add_observer(collect::disable_loose_search)
-            .add_observer(outdated::remove_with_terrain)
-            .add_observer(outdated::drop_other_vertices)
-            .add_observer(outdated::drop_slim_vertices)
-            .add_observer(redraw::redraw)
-            .add_observer(reports::forget_reports)
-            .configure_sets(
-                Update,
-                (
-                    BeforeLoad::Worlds,
-                    BeforeLoad::Sources,
-                    BurrowSystems::Load,
-                    BurrowSystems::Collect,
-                    BurrowSystems::Commit,
-                    BurrowSystems::Begin,
-                    BurrowSystems::Propagate,
-                )
-                    .chain(),
-            )
-            .add_systems(
-                Update,
-                (
-                    (
-                        places::scale_terrains,
-                        outdated::drop_stray_tasks,
-                        outdated::drop_replaced,
-                        load::start_loading,
-                        places::place_terrains,
-                        lod::find_eyes,
-                        load::finish_loading,
-                        lod::keep_wanted_tiles,
-                    )
-                        .chain()
-                        .in_set(BurrowSystems::Load),
-                    (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
-                    commit::commit_transactions.in_set(BurrowSystems::Commit),
-                    (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
-                ),
-            );
+        add_resources(app);
+        add_messages(app);
+        add_observers(app);
+        add_update_systems(app);
         #[cfg(any(feature = "scatter", feature = "landmass"))]
         app.add_message::<GroundChanged>();
         #[cfg(any(feature = "replicon", feature = "scatter", feature = "landmass"))]
@@ -266,4 +207,83 @@ impl Plugin for TerrainPlugin {
     fn finish(&self, app: &mut App) {
         engine::suggest_renderers_gpu(app.world());
     }
+}
+
+/// Adds the resources.
+fn add_resources(app: &mut App) {
+    app.init_resource::<BurrowSettings>()
+        .init_resource::<BurrowFigures>()
+        .init_resource::<BurrowEngine>()
+        .init_resource::<ThreadSettings>()
+        .init_resource::<task::TaskCounter>()
+        .init_resource::<SurfaceProcessors>()
+        .init_resource::<inbox::Inbox>()
+        .init_resource::<reports::Reported>()
+        .init_resource::<same_frame::SameFrame>()
+        .init_resource::<WantedTiles>();
+}
+
+/// Adds the messages that games send and receive.
+fn add_messages(app: &mut App) {
+    app.add_message::<Brush>()
+        .register_type::<Brush>()
+        .register_type_data::<Brush, ReflectMessage>()
+        .add_message::<TargetedBrush>()
+        .add_message::<BrushApplied>()
+        .add_message::<Undo>()
+        .add_message::<Redo>()
+        .add_message::<HistoryMoved>()
+        .add_message::<LoosePieceFound>()
+        .add_message::<LoosePieceReturned>();
+}
+
+/// Adds the observers of components that games insert and remove.
+fn add_observers(app: &mut App) {
+    app.add_observer(outdated::prepare_new)
+        .add_observer(collect::free_history)
+        .add_observer(collect::answer_removed)
+        .add_observer(collect::enable_loose_search)
+        .add_observer(collect::disable_loose_search)
+        .add_observer(outdated::remove_with_terrain)
+        .add_observer(outdated::drop_other_vertices)
+        .add_observer(outdated::drop_slim_vertices)
+        .add_observer(redraw::redraw)
+        .add_observer(reports::forget_reports);
+}
+
+/// Orders the sets in `Update`, and adds their systems.
+fn add_update_systems(app: &mut App) {
+    app.configure_sets(
+        Update,
+        (
+            BeforeLoad::Worlds,
+            BeforeLoad::Sources,
+            BurrowSystems::Load,
+            BurrowSystems::Collect,
+            BurrowSystems::Commit,
+            BurrowSystems::Begin,
+            BurrowSystems::Propagate,
+        )
+            .chain(),
+    )
+    .add_systems(
+        Update,
+        (
+            (
+                places::scale_terrains,
+                outdated::drop_stray_tasks,
+                outdated::drop_replaced,
+                load::start_loading,
+                places::place_terrains,
+                lod::find_eyes,
+                load::finish_loading,
+                lod::keep_wanted_tiles,
+            )
+                .chain()
+                .in_set(BurrowSystems::Load),
+            (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
+            commit::commit_transactions.in_set(BurrowSystems::Commit),
+            (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
+        ),
+    );
 }

@@ -79,9 +79,9 @@ pub use queue::WorkLimits;
 #[doc(hidden)]
 pub use receipt::ChunkScenario;
 pub use receipt::{Applied, OrderKind, Receipt, Rejection, ScenarioCounts};
+pub use record::CommitRecord;
 #[doc(hidden)]
 pub use record::WorldParts;
-pub use record::CommitRecord;
 #[doc(hidden)]
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]

@@ -34,6 +34,41 @@ impl SplatOptions {
     pub fn of(layers: impl IntoIterator<Item = MaterialId>) -> Self {
         Self { layers: layers.into_iter().map(Some).collect(), ..Self::default() }
     }
+
+    /// The material of a channel, counted over all files.
+    fn layer(&self, channel: usize) -> Option<MaterialId> {
+        self.layers.get(channel).copied().flatten()
+    }
+
+    /// What was ignored or looks wrong in files. `channels` are the files of all channels, and their numbers there;
+    /// `weighted` are the samples in which each has weight.
+    fn notes(&self, maps: &[Weights], channels: &[(usize, usize)], weighted: &[u64]) -> Vec<MaterialNote> {
+        let mut notes = Vec::new();
+        for (file, map) in maps.iter().enumerate() {
+            match map.pixels.color {
+                ColorType::GrayscaleAlpha => notes.push(MaterialNote::AlphaIgnored { file }),
+                ColorType::Rgba => {
+                    let channel = channels.iter().position(|own| *own == (file, 3)).unwrap_or_default();
+                    let pixels = map.pixels.width as usize * map.pixels.height as usize;
+                    let is_full = || (0..pixels).all(|pixel| map.weight(pixel, 3) == u16::MAX);
+                    if self.layer(channel).is_some() && is_full() {
+                        notes.push(MaterialNote::LooksOpaque { file });
+                    }
+                }
+                _ => {}
+            }
+        }
+        for (channel, &count) in weighted.iter().enumerate() {
+            // The alpha channel of a picture without layers in it is full.
+            let is_alpha = channels[channel].1 == 3;
+            match self.layer(channel) {
+                Some(_) if count == 0 => notes.push(MaterialNote::LayerEmpty { channel }),
+                None if count > 0 && !is_alpha => notes.push(MaterialNote::LayerMissing { channel, count }),
+                _ => {}
+            }
+        }
+        notes
+    }
 }
 
 /// The meaning of the samples of an id map.
@@ -209,6 +244,37 @@ fn check(materials: impl IntoIterator<Item = MaterialId>) -> Result<(), ImportEr
     Ok(())
 }
 
+/// Decodes the weights of files, which must have one size.
+fn decode_weights<B: AsRef<[u8]>>(files: &[B], options: &SplatOptions) -> Result<Vec<Weights>, ImportError> {
+    let mut maps: Vec<Weights> = Vec::with_capacity(files.len());
+    for (file, bytes) in files.iter().enumerate() {
+        let map = Weights::of(Pixels::decode(bytes.as_ref(), &options.limits)?)?;
+        let (width, height) = (map.pixels.width, map.pixels.height);
+        let first = maps.first().map_or((width, height), |map| (map.pixels.width, map.pixels.height));
+        if (width, height) != first {
+            return Err(ImportError::MapSize { file, width, height, first });
+        }
+        maps.push(map);
+    }
+    Ok(maps)
+}
+
+/// The column of a sample with these two strongest layers, over the material below the surface if one is named.
+fn blend(
+    [(most, strongest), (next, second)]: [(u16, MaterialId); 2],
+    deep: Option<MaterialId>,
+) -> ColumnMaterial {
+    match deep {
+        Some(base) => ColumnMaterial { base, overlay: strongest, blend: 255 },
+        None if next == 0 => ColumnMaterial::solid(strongest),
+        None => {
+            // At most 127, so the strongest remains the one that the ground is made of.
+            let blend = u32::from(next) * 255 / (u32::from(most) + u32::from(next));
+            ColumnMaterial { base: strongest, overlay: second, blend: blend as u8 }
+        }
+    }
+}
+
 /// How many samples show each material.
 fn count(columns: &[ColumnMaterial]) -> Vec<(MaterialId, u64)> {
     let mut counts = [0_u64; 256];
@@ -243,18 +309,12 @@ impl MaterialMap {
         files: &[B],
         options: &SplatOptions,
     ) -> Result<(Self, MaterialReport), ImportError> {
-        let named = options.layers.iter().flatten();
-        check(named.clone().copied().chain(options.deep))?;
-        let mut maps: Vec<Weights> = Vec::with_capacity(files.len());
-        for (file, bytes) in files.iter().enumerate() {
-            let map = Weights::of(Pixels::decode(bytes.as_ref(), &options.limits)?)?;
-            let (width, height) = (map.pixels.width, map.pixels.height);
-            let first = maps.first().map_or((width, height), |map| (map.pixels.width, map.pixels.height));
-            if (width, height) != first {
-                return Err(ImportError::MapSize { file, width, height, first });
-            }
-            maps.push(map);
-        }
+        check(options.layers.iter().flatten().copied().chain(options.deep))?;
+        Self::of_weights(&decode_weights(files, options)?, options)
+    }
+
+    /// The map of the strongest layers, from the weights of all files.
+    fn of_weights(maps: &[Weights], options: &SplatOptions) -> Result<(Self, MaterialReport), ImportError> {
         let Some((width, height)) = maps.first().map(|map| (map.pixels.width, map.pixels.height)) else {
             return Err(ImportError::Empty);
         };
@@ -263,12 +323,11 @@ impl MaterialMap {
             .enumerate()
             .flat_map(|(file, map)| (0..map.channels).map(move |own| (file, own)))
             .collect();
-        let layers = named.count();
+        let layers = options.layers.iter().flatten().count();
         if layers == 0 || layers > MAX_LAYERS || options.layers.len() > channels.len() {
             let (named, channels) = (options.layers.len(), channels.len());
             return Err(ImportError::Layers { named, layers, channels, most: MAX_LAYERS });
         }
-        let layer_of = |channel: usize| options.layers.get(channel).copied().flatten();
         let pixels = width as usize * height as usize;
         let mut columns = Vec::new();
         columns.try_reserve_exact(pixels).map_err(|_| ImportError::Memory { bytes: pixels as u64 * 3 })?;
@@ -280,49 +339,18 @@ impl MaterialMap {
             for (channel, &(file, own)) in channels.iter().enumerate() {
                 let weight = maps[file].weight(pixel, own);
                 weighted[channel] += u64::from(weight > 0);
-                match layer_of(channel) {
+                match options.layer(channel) {
                     Some(layer) if weight > best[0].0 => best = [(weight, layer), best[0]],
                     Some(layer) if weight > best[1].0 => best[1] = (weight, layer),
                     _ => {}
                 }
             }
-            let [(most, strongest), (next, second)] = best;
-            if most == 0 {
+            if best[0].0 == 0 {
                 unweighted = (unweighted.0 + 1, if unweighted.0 == 0 { pixel } else { unweighted.1 });
             }
-            columns.push(match options.deep {
-                Some(base) => ColumnMaterial { base, overlay: strongest, blend: 255 },
-                None if next == 0 => ColumnMaterial::solid(strongest),
-                None => {
-                    // At most 127, so the strongest remains the one that the ground is made of.
-                    let blend = u32::from(next) * 255 / (u32::from(most) + u32::from(next));
-                    ColumnMaterial { base: strongest, overlay: second, blend: blend as u8 }
-                }
-            });
+            columns.push(blend(best, options.deep));
         }
-        let mut notes = Vec::new();
-        for (file, map) in maps.iter().enumerate() {
-            match map.pixels.color {
-                ColorType::GrayscaleAlpha => notes.push(MaterialNote::AlphaIgnored { file }),
-                ColorType::Rgba => {
-                    let channel = channels.iter().position(|own| *own == (file, 3)).unwrap_or_default();
-                    let is_full = || (0..pixels).all(|pixel| map.weight(pixel, 3) == u16::MAX);
-                    if layer_of(channel).is_some() && is_full() {
-                        notes.push(MaterialNote::LooksOpaque { file });
-                    }
-                }
-                _ => {}
-            }
-        }
-        for (channel, &count) in weighted.iter().enumerate() {
-            // The alpha channel of a picture without layers in it is full.
-            let is_alpha = channels[channel].1 == 3;
-            match layer_of(channel) {
-                Some(_) if count == 0 => notes.push(MaterialNote::LayerEmpty { channel }),
-                None if count > 0 && !is_alpha => notes.push(MaterialNote::LayerMissing { channel, count }),
-                _ => {}
-            }
-        }
+        let mut notes = options.notes(maps, &channels, &weighted);
         if let (count @ 1.., first) = unweighted {
             let (x, z) = maps[0].pixels.place(first);
             notes.push(MaterialNote::NoWeight { count, x, z });

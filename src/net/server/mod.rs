@@ -187,7 +187,7 @@ impl fmt::Debug for Server {
 
 impl Server {
     /// The version of the protocol. It changes whenever the encoding of messages does.
-    pub const PROTOCOL: u32 = PROTOCOL;
+    pub const PROTOCOL: u32 = super::message::PROTOCOL;
 
     /// A server of a world that is not saved.
     pub fn new(terrain: Terrain, settings: ServerSettings) -> Self {

@@ -1,5 +1,7 @@
 //! Tests of the buttons for files: unsaved changes, questions, levels that are replaced.
 
+use std::time::Duration;
+
 use super::*;
 
 /// How often the app was asked to end. Messages themselves are gone after two frames.

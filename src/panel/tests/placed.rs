@@ -1,6 +1,9 @@
 //! Tests of a placed brush and its handles, in an app with a camera but without a window.
 
+use std::time::Duration;
+
 use super::*;
+use crate::brush::Edit;
 use crate::panel::handle_geometry::{Axis, Handle, test_camera};
 use crate::plugins::BurrowPlugins;
 

@@ -12,10 +12,12 @@ use crate::plugin::entities::places::{Places, is_usable};
 use crate::plugin::figures::MainThread;
 use crate::plugin::reports::{Report, Reports};
 use crate::plugin::{
-    BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned,
-    Redo, TargetedBrush, Undo,
+    BrushApplied, BurrowFigures, EditOutbox, HistoryMoved, LoosePieceFound, LoosePieceReturned, Redo,
+    TargetedBrush, Undo,
 };
-use crate::terrain::{LooseSettings, Order, OrderKind, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique};
+use crate::terrain::{
+    LooseSettings, Order, OrderKind, Receipt, Rejection, Request, ReturnedPiece, Terrain, Together, unique,
+};
 use crate::threads::free_later;
 
 /// Transforms brushes into the space of each terrain and queues them. A brush that a terrain cannot queue is rejected
@@ -36,12 +38,7 @@ pub(in crate::plugin) fn collect_brushes(
         if loose.is_some() && loose.as_ref() != terrain.loose() {
             terrain.set_loose(loose);
         }
-        if terrain.has_receipts(is_edit) {
-            let answered = terrain.take_receipts_of(is_edit);
-            found.write_batch(pieces(entity, &answered));
-            let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
-            answers.write_batch(answered.into_iter().map(applied));
-        }
+        send_receipts((entity, terrain), &mut answers, &mut found);
     }
     let mut reject = |brush: &Brush, terrain, rejection| {
         answers.write(BrushApplied { terrain, receipt: Receipt::of_edit(brush.tag, Err(rejection)) });
@@ -52,17 +49,11 @@ pub(in crate::plugin) fn collect_brushes(
         // The rejection that is sent if no terrain answers.
         let mut unanswered = Some(Rejection::OutsideWorld);
         // Only terrains that queue a brush are borrowed mutably, so that others do not count as changed.
-        for (entity, mut terrain, _, outbox) in &mut terrains {
+        for (entity, terrain, _, outbox) in &mut terrains {
             let Some(place) = places.of(entity).filter(is_usable) else { continue };
             match Effect::of(brush, &place, terrain.world().grid()) {
                 Effect::Taken(edit) => {
-                    let queued = match outbox {
-                        Some(mut outbox) => {
-                            outbox.orders.push(Order::Edit(edit));
-                            Ok(())
-                        }
-                        None => queue(&mut terrain, edit.into(), together),
-                    };
+                    let queued = queue_or_send(terrain, outbox, edit, together);
                     queued.unwrap_or_else(|rejection| reject(brush, Some(entity), rejection));
                     unanswered = None;
                 }
@@ -87,26 +78,68 @@ pub(in crate::plugin) fn collect_brushes(
         }
     }
     for &TargetedBrush { terrain: entity, ref brush } in &targeted {
-        match (terrains.get_mut(entity), places.of(entity).filter(is_usable)) {
-            (Ok((_, mut terrain, _, outbox)), Some(place)) => {
-                let edit = Edit::quantize(&to_terrain(brush, &place));
-                if let Err(error) = &edit {
-                    warn_of_invalid(entity, error, &reports);
-                }
-                let queued = match (outbox, edit) {
-                    (Some(mut outbox), Ok(edit)) => {
-                        outbox.orders.push(Order::Edit(edit));
-                        Ok(())
-                    }
-                    (Some(_), Err(error)) => Err(error.into()),
-                    (None, edit) => queue(&mut terrain, Request::of_edit(brush, edit), together),
-                };
-                queued.unwrap_or_else(|rejection| reject(brush, Some(entity), rejection));
+        let queued = match (terrains.get_mut(entity), places.of(entity).filter(is_usable)) {
+            (Ok((_, terrain, _, outbox)), Some(place)) => {
+                queue_targeted(brush, &place, (entity, terrain), outbox, together, &reports)
             }
-            _ => reject(brush, Some(entity), Rejection::TerrainGone),
-        }
+            _ => Err(Rejection::TerrainGone),
+        };
+        queued.unwrap_or_else(|rejection| reject(brush, Some(entity), rejection));
     }
     figures.begin_frame(start.elapsed());
+}
+
+/// Sends the receipts of edits that no transaction of the plugin answers.
+fn send_receipts(
+    (entity, mut terrain): (Entity, Mut<Terrain>),
+    answers: &mut MessageWriter<BrushApplied>,
+    found: &mut MessageWriter<LoosePieceFound>,
+) {
+    if terrain.has_receipts(is_edit) {
+        let answered = terrain.take_receipts_of(is_edit);
+        found.write_batch(pieces(entity, &answered));
+        let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
+        answers.write_batch(answered.into_iter().map(applied));
+    }
+}
+
+/// Puts an edit into the terrain's outbox, or queues it without one.
+fn queue_or_send(
+    mut terrain: Mut<Terrain>,
+    outbox: Option<Mut<EditOutbox>>,
+    edit: Edit,
+    together: Together,
+) -> Result<(), Rejection> {
+    match outbox {
+        Some(mut outbox) => {
+            outbox.orders.push(Order::Edit(edit));
+            Ok(())
+        }
+        None => queue(&mut terrain, edit.into(), together),
+    }
+}
+
+/// Puts a brush that names its terrain into the terrain's outbox, or queues it without one.
+fn queue_targeted(
+    brush: &Brush,
+    place: &GlobalTransform,
+    (entity, mut terrain): (Entity, Mut<Terrain>),
+    outbox: Option<Mut<EditOutbox>>,
+    together: Together,
+    reports: &Reports,
+) -> Result<(), Rejection> {
+    let edit = Edit::quantize(&to_terrain(brush, place));
+    if let Err(error) = &edit {
+        warn_of_invalid(entity, error, reports);
+    }
+    match (outbox, edit) {
+        (Some(mut outbox), Ok(edit)) => {
+            outbox.orders.push(Order::Edit(edit));
+            Ok(())
+        }
+        (Some(_), Err(error)) => Err(error.into()),
+        (None, edit) => queue(&mut terrain, Request::of_edit(brush, edit), together),
+    }
 }
 
 /// Queues an edit if there is room for it.

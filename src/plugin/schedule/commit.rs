@@ -25,7 +25,7 @@ use crate::plugin::{
 };
 #[cfg(any(feature = "scatter", feature = "landmass"))]
 use crate::terrain::Version;
-use crate::terrain::{OrderKind, Receipt, Rejection, Terrain};
+use crate::terrain::{Commit, OrderKind, PendingDisplay, Receipt, Rejection, Terrain};
 use crate::threads::free_later;
 
 /// Starts a transaction for each terrain that has brushes or steps waiting and none under way.
@@ -251,11 +251,7 @@ fn commit(
                     versions: [entities.shown, pending.version()],
                     boxes: Some(pending.boxes()),
                 });
-                entities.shown = pending.version();
-                display.show((entity, terrain.world()), &mut entities, surfaces, pending.fields(), true);
-                display.show_nodes((entity, terrain.world()), &mut entities, nodes);
-                // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
-                entities.trigger_ready(&mut display.commands, entity);
+                show_pending((entity, &terrain), &mut entities, &pending, (surfaces, nodes), display);
                 display.figures.measure(start.elapsed());
             }
             return is_shown;
@@ -267,41 +263,94 @@ fn commit(
         }
     };
     if commit.is_cut() {
-        let changed = nodes.len();
-        if terrain.bypass_change_detection().commit_shown(commit).is_err() {
-            return false;
+        let is_committed = commit_cut((entity, terrain), entities, levels, commit, nodes, display);
+        if is_committed {
+            display.figures.measure(start.elapsed());
         }
-        display.show_nodes((entity, terrain.world()), &mut entities, nodes);
-        if let (Some((mut state, shown, watchers)), Some(drawn)) = (levels, terrain.drawn_cut()) {
-            let now = ShownLevels::of(drawn.cut(), state.count(changed));
-            match shown {
-                Some(mut shown) => {
-                    shown.set_if_neq(now);
-                }
-                // The game removed it.
-                None => {
-                    display.commands.entity(entity).try_insert(now);
-                }
-            }
-            if state.is_settled {
-                let is_seen = display.assets.is_none() || !watchers.eyes.is_empty();
-                if !is_seen && display.reports.is_new(entity, Report::NobodyLooks) {
-                    warn!(
-                        "the terrain {entity} has levels of detail and is drawn at its coarsest, as no camera looks at it: \
-                         spawn a `Camera3d` whose `RenderLayers` meet the terrain's, or a `DetailSource` while the game loads"
-                    );
-                }
-                entities.trigger_ready(&mut display.commands, entity);
-            }
-        }
-        display.figures.measure(start.elapsed());
-        return true;
+        return is_committed;
     }
+    let triangles = surfaces.iter().map(BuiltSurface::triangles).sum();
+    let built = (surfaces, nodes);
+    let Some(receipts) = commit_edits((entity, terrain), entities, commit, built, display, messages) else {
+        return false;
+    };
+    let brushes = receipts.len() as u64;
+    send_receipts(entity, receipts, pieces, &display.reports, messages);
+    let took = start.elapsed();
+    display.figures.count(brushes, times.total, took);
+    measure_commit(&mut display.diagnostics, times, took, triangles);
+    true
+}
+
+/// Shows changes that the game made itself.
+fn show_pending(
+    (entity, terrain): (Entity, &Terrain),
+    entities: &mut TerrainEntities,
+    pending: &PendingDisplay,
+    (surfaces, nodes): (Vec<BuiltSurface>, Vec<BuiltNode>),
+    display: &mut Display,
+) {
+    entities.shown = pending.version();
+    display.show((entity, terrain.world()), entities, surfaces, pending.fields(), true);
+    display.show_nodes((entity, terrain.world()), entities, nodes);
+    // A game that changes the ground in each frame is always one step ahead; all that was loaded is shown.
+    entities.trigger_ready(&mut display.commands, entity);
+}
+
+/// Commits and shows another cut of a terrain's levels of detail; returns whether the terrain took it.
+fn commit_cut(
+    (entity, mut terrain): (Entity, Mut<Terrain>),
+    mut entities: Mut<TerrainEntities>,
+    levels: Option<(Mut<LodState>, Option<Mut<ShownLevels>>, &Watchers)>,
+    commit: Commit,
+    nodes: Vec<BuiltNode>,
+    display: &mut Display,
+) -> bool {
+    let changed = nodes.len();
+    if terrain.bypass_change_detection().commit_shown(commit).is_err() {
+        return false;
+    }
+    display.show_nodes((entity, terrain.world()), &mut entities, nodes);
+    if let (Some((mut state, shown, watchers)), Some(drawn)) = (levels, terrain.drawn_cut()) {
+        let now = ShownLevels::of(drawn.cut(), state.count(changed));
+        match shown {
+            Some(mut shown) => {
+                shown.set_if_neq(now);
+            }
+            // The game removed it.
+            None => {
+                display.commands.entity(entity).try_insert(now);
+            }
+        }
+        if state.is_settled {
+            let is_seen = display.assets.is_none() || !watchers.eyes.is_empty();
+            if !is_seen && display.reports.is_new(entity, Report::NobodyLooks) {
+                warn!(
+                    "the terrain {entity} has levels of detail and is drawn at its coarsest, as no camera looks at it: \
+                     spawn a `Camera3d` whose `RenderLayers` meet the terrain's, or a `DetailSource` while the game loads"
+                );
+            }
+            entities.trigger_ready(&mut display.commands, entity);
+        }
+    }
+    true
+}
+
+/// Commits and shows the edits and steps of a transaction. Returns the receipts of its edits, or `None` if the terrain
+/// refused the commit.
+fn commit_edits(
+    (entity, mut terrain): (Entity, Mut<Terrain>),
+    mut entities: Mut<TerrainEntities>,
+    commit: Commit,
+    (surfaces, nodes): (Vec<BuiltSurface>, Vec<BuiltNode>),
+    display: &mut Display,
+    messages: &mut CommitMessages,
+) -> Option<Vec<Receipt>> {
     let is_whole = commit.is_whole();
     let fields = commit.field_news().to_vec();
     #[cfg(any(feature = "scatter", feature = "landmass"))]
     let (boxes, before) = (commit.changed_boxes(), terrain.world().version());
-    let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return false };
+    let Ok((receipts, waste)) = terrain.commit_shown(commit) else { return None };
     if !waste.is_empty() {
         free_later(waste);
     }
@@ -317,23 +366,28 @@ fn commit(
     if !is_whole {
         entities.shown = terrain.world().version();
     }
-    let triangles = surfaces.iter().map(BuiltSurface::triangles).sum();
     display.show((entity, terrain.world()), &mut entities, surfaces, &fields, is_step);
     display.show_nodes((entity, terrain.world()), &mut entities, nodes);
+    Some(receipts)
+}
+
+/// Sends the receipts of a commit's edits and the pieces of ground that broke off, and logs the first panic.
+fn send_receipts(
+    terrain: Entity,
+    receipts: Vec<Receipt>,
+    pieces: Vec<LoosePieceFound>,
+    reports: &Reports,
+    messages: &mut CommitMessages,
+) {
     let has_panicked = |receipt: &Receipt| receipt.outcome == Err(Rejection::Panicked);
-    if receipts.iter().any(has_panicked) && display.reports.is_new(entity, Report::BrushPanicked) {
+    if receipts.iter().any(has_panicked) && reports.is_new(terrain, Report::BrushPanicked) {
         warn!(
-            "a brush was rejected by the terrain {entity} because applying it panicked; this is a bug, please report it"
+            "a brush was rejected by the terrain {terrain} because applying it panicked; this is a bug, please report it"
         );
     }
-    let brushes = receipts.len() as u64;
     messages.found.write_batch(pieces);
-    let applied = |receipt| BrushApplied { terrain: Some(entity), receipt };
+    let applied = |receipt| BrushApplied { terrain: Some(terrain), receipt };
     messages.receipts.write_batch(receipts.into_iter().map(applied));
-    let took = start.elapsed();
-    display.figures.count(brushes, times.total, took);
-    measure_commit(&mut display.diagnostics, times, took, triangles);
-    true
 }
 
 /// The commit after a task panicked: the rejection of its transaction. `None` if it was not a transaction, or

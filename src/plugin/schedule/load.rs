@@ -52,6 +52,20 @@ impl Loading {
     pub(super) fn is_of(&self, terrain: &Terrain) -> bool {
         self.world.version().is_same_world(terrain.world().version())
     }
+
+    /// Passes meshes to the renderer, as many as are left of a frame's budget. Returns whether it has all.
+    fn upload(&mut self, assets: &mut Option<ResMut<Assets<Mesh>>>, budget: &mut usize) -> bool {
+        let rest = self.waiting.len().saturating_sub(*budget);
+        *budget -= self.waiting.len() - rest;
+        for mut built in self.waiting.split_off(rest) {
+            if let (Some(assets), Some(mesh)) = (assets.as_mut(), &mut built.mesh) {
+                // The budget was spent on it above.
+                mesh.upload(assets, &mut 1);
+            }
+            self.ready.insert(built.drawn, built);
+        }
+        self.waiting.is_empty()
+    }
 }
 
 /// Terrains without a task that are not held.
@@ -190,16 +204,7 @@ pub(in crate::plugin) fn finish_loading(
             };
             (loading.task, (loading.waiting, loading.levels)) = (None, parts);
         }
-        let rest = loading.waiting.len().saturating_sub(budget);
-        budget -= loading.waiting.len() - rest;
-        for mut built in loading.waiting.split_off(rest) {
-            if let (Some(assets), Some(mesh)) = (&mut assets, &mut built.mesh) {
-                // The budget was spent on it above.
-                mesh.upload(assets, &mut 1);
-            }
-            loading.ready.insert(built.drawn, built);
-        }
-        if !loading.waiting.is_empty() {
+        if !loading.upload(&mut assets, &mut budget) {
             continue;
         }
         if let Some(old) = old {

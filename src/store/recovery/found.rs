@@ -137,37 +137,13 @@ impl Contents {
         let reading = Work::until(progress, DATABASE_READ, 1);
         let source = Source::read(files, DATABASE)?;
         let has_database = !matches!(source, Source::Missing);
-        let (raw, damaged, error) = match source {
-            Source::Whole(raw) => (raw, None, None),
-            Source::Damaged { what, records } => (records, Some(what), None),
-            Source::Missing => (Vec::new(), Some(format!("the file {DATABASE} is missing")), None),
-            Source::Unreadable(error) => {
-                let what = format!("the file {DATABASE} can't be read: {error}");
-                (Vec::new(), Some(what), Some(error))
-            }
-        };
+        let (raw, damaged, error) = database_of(source);
         reading.finish();
         let reading = Work::until(progress, FILES_READ, numbers.len() as u64);
         let mut world = world_of(&raw, true);
-        let mut segments = Vec::with_capacity(numbers.len());
-        for number in numbers {
-            let found = segment::read(files, world, number);
-            let found = found.map_err(StoreError::files("reading the journal"))?;
-            refuse_newer(found.newer)?;
-            world = world.or(found.world);
-            segments.push(found);
-            reading.advance(1);
-        }
+        let segments = read_segments(files, numbers, &mut world, &reading)?;
         let named = FoundContents::read(files, segments.iter().flat_map(|found| found.names(..)).collect());
-        let numbers = segments.iter().flat_map(|found| {
-            let own = found.frames.iter().map(|frame| frame.number);
-            own.chain((found.length > 0).then_some(found.number))
-        });
-        if numbers.max() > Some(MAX_NUMBER / 2) {
-            return Err(StoreError::Unreadable(
-                "the numbers in its journal leave none for what follows".into(),
-            ));
-        }
+        check_numbers(&segments)?;
         let unsaved = unsaved::read(files);
         let is_there = |first: u64| segments.iter().any(|found| found.number >= first);
         let mut contents = Self {
@@ -184,46 +160,54 @@ impl Contents {
             copies: Vec::new(),
             invalid: BTreeMap::new(),
         };
-        let mut others = Vec::new();
-        if contents.damaged.is_some() {
-            // An interrupted step may have left more.
-            for path in sources::others(files).map_err(StoreError::files("reading the regions"))? {
-                if let Ok(source @ (Source::Whole(_) | Source::Damaged { .. })) = Source::read(files, &path) {
-                    world = world.or_else(|| world_of(source.records(), true));
-                    others.push(source);
-                }
-            }
-        }
-        // One that is whole goes before what is left of another.
-        others.sort_by_key(|source| matches!(source, Source::Damaged { .. }));
+        // An interrupted step may have left more.
+        let is_damaged = contents.damaged.is_some();
+        let others = if is_damaged { read_others(files, &mut world)? } else { Vec::new() };
         let all = || std::iter::once(&raw[..]).chain(others.iter().map(Source::records));
         match world.or_else(|| all().find_map(|records| world_of(records, false))) {
             Some(world) => contents.world = world,
             None => return Err(contents.no_world(&raw)?),
         }
-        for (key, record) in raw {
-            let entered = contents.records.enter(contents.world, &key, record);
+        contents.enter_records(raw)?;
+        contents.enter_others(others);
+        contents.enter_copies(files)?;
+        reading.finish();
+        Ok(contents)
+    }
+
+    /// Adds the records of the file of regions.
+    fn enter_records(&mut self, records: Vec<(Vec<u8>, Vec<u8>)>) -> Result<(), StoreError> {
+        for (key, record) in records {
+            let entered = self.records.enter(self.world, &key, record);
             let Err((error, record)) = entered else { continue };
             refuse_newer(error.newer_schema())?;
             if let Some(Key::Region(at)) = Key::of(&key) {
-                contents.invalid.insert(at, record);
+                self.invalid.insert(at, record);
             }
         }
+        Ok(())
+    }
+
+    /// Adds the records of other files that may hold regions.
+    fn enter_others(&mut self, others: Vec<Source>) {
         for (key, record) in others.into_iter().flat_map(Source::into_records) {
-            let is_invalid = contents.others.enter(contents.world, &key, record).is_err();
+            let is_invalid = self.others.enter(self.world, &key, record).is_err();
             if let (true, Some(Key::Region(at))) = (is_invalid, Key::of(&key)) {
                 // There was a region, whatever it held.
-                contents.others.regions.entry(at).or_default();
+                self.others.regions.entry(at).or_default();
             }
         }
-        for copy in checkpoint_copy::read(files, contents.world) {
+    }
+
+    /// Adds the copies of checkpoints.
+    fn enter_copies(&mut self, files: &dyn Files) -> Result<(), StoreError> {
+        for copy in checkpoint_copy::read(files, self.world) {
             match copy {
-                Ok(copy) => contents.copies.extend(decode_checkpoint(&copy)),
+                Ok(copy) => self.copies.extend(decode_checkpoint(&copy)),
                 Err(error) => refuse_newer(error.newer_schema())?,
             }
         }
-        reading.finish();
-        Ok(contents)
+        Ok(())
     }
 
     /// The error if the world can't be identified.
@@ -330,6 +314,64 @@ impl Contents {
             None => Ok(()),
         }
     }
+}
+
+/// The records of the file of regions; its fault, if it can't be used; and the error, if it can't be read at the moment.
+fn database_of(source: Source) -> (Vec<(Vec<u8>, Vec<u8>)>, Option<String>, Option<io::Error>) {
+    match source {
+        Source::Whole(raw) => (raw, None, None),
+        Source::Damaged { what, records } => (records, Some(what), None),
+        Source::Missing => (Vec::new(), Some(format!("the file {DATABASE} is missing")), None),
+        Source::Unreadable(error) => {
+            let what = format!("the file {DATABASE} can't be read: {error}");
+            (Vec::new(), Some(what), Some(error))
+        }
+    }
+}
+
+/// Reads the segments with these numbers. The first that names a world decides which one it is, if that is not known.
+fn read_segments(
+    files: &dyn Files,
+    numbers: Vec<u64>,
+    world: &mut Option<WorldId>,
+    reading: &Work,
+) -> Result<Vec<Found>, StoreError> {
+    let mut segments = Vec::with_capacity(numbers.len());
+    for number in numbers {
+        let found = segment::read(files, *world, number);
+        let found = found.map_err(StoreError::files("reading the journal"))?;
+        refuse_newer(found.newer)?;
+        *world = world.or(found.world);
+        segments.push(found);
+        reading.advance(1);
+    }
+    Ok(segments)
+}
+
+/// Refuses a journal whose numbers leave none for what follows.
+fn check_numbers(segments: &[Found]) -> Result<(), StoreError> {
+    let numbers = segments.iter().flat_map(|found| {
+        let own = found.frames.iter().map(|frame| frame.number);
+        own.chain((found.length > 0).then_some(found.number))
+    });
+    if numbers.max() > Some(MAX_NUMBER / 2) {
+        return Err(StoreError::Unreadable("the numbers in its journal leave none for what follows".into()));
+    }
+    Ok(())
+}
+
+/// Reads other files that may hold regions. Whole ones come before what is left of others. The first that names a world
+/// decides which one it is, if that is not known.
+fn read_others(files: &dyn Files, world: &mut Option<WorldId>) -> Result<Vec<Source>, StoreError> {
+    let mut others = Vec::new();
+    for path in sources::others(files).map_err(StoreError::files("reading the regions"))? {
+        if let Ok(source @ (Source::Whole(_) | Source::Damaged { .. })) = Source::read(files, &path) {
+            *world = world.or_else(|| world_of(source.records(), true));
+            others.push(source);
+        }
+    }
+    others.sort_by_key(|source| matches!(source, Source::Damaged { .. }));
+    Ok(others)
 }
 
 /// The world that records belong to: that of a checkpoint, or of any valid record.

@@ -83,162 +83,301 @@ pub(in crate::store) fn recover(
     ground: &Arc<Ground>,
     options: &StoreOptions,
 ) -> Result<Recovered, StoreError> {
-    let StoreOptions { base_changed, level, progress, .. } = options;
-    let (base_changed, level, progress) = (*base_changed, level.as_ref(), progress.as_ref());
-    let found = contents.choose_checkpoint();
-    let has_lost_rest = found.is_none();
-    let checkpoint = match found {
-        Some(checkpoint) => checkpoint,
-        None if options.salvage => contents.assume_checkpoint(),
-        None => {
-            let why = "neither journal nor database hold a valid checkpoint";
-            return Err(StoreError::Unreadable(why.into()));
-        }
-    };
-    let level = match has_lost_rest {
-        false => BaseLevel::needed(checkpoint.level.as_ref(), level)?,
-        true if !contents.is_on_level() => None,
-        true => {
-            let missing = || StoreError::LevelMissing { label: "unknown".into() };
-            Some(level.ok_or_else(missing)?)
-        }
-    };
-    let whole = contents.frames_from(1);
-    let last = whole.last().map_or(0, |last| last.number);
-    let is_contiguous = last >= checkpoint.frame;
-    let base = segment::base(ground.hash(), level.map(BaseLevel::name));
-    let reaches_back = contents.reaches_back(checkpoint.frame, base);
-    let has_other_log = reaches_back && !has_lost_rest && !contents.leads_to(&checkpoint);
-    let is_log_whole = match has_lost_rest {
-        false => reaches_back && !has_other_log,
-        true => reaches_back && contents.reaches(checkpoint.metadata.revision),
-    };
-    let tail = contents.frames_from(checkpoint.frame + 1);
-    let is_same_ground = checkpoint.metadata.ground == ground.hash() || has_lost_rest;
-    let other_level = BaseLevel::expect(level, checkpoint.level.as_ref());
-    let is_same_base = is_same_ground && other_level.is_ok();
-    // Commits after the checkpoint were made by another simulation: they can be replayed, but not verified.
-    let is_replayed = is_same_base && tail.iter().any(|frame| frame.base != base);
-    let size = GroundSize::of(ground);
-    let other_size = checkpoint.cells.filter(|saved| *saved != size);
-    if let Some(saved) = other_size {
-        let replays = base_changed == BaseChanged::Replay && is_contiguous;
-        let why = match () {
-            () if base_changed == BaseChanged::Refuse => {
-                Some("only the ground that it was saved with is allowed")
-            }
-            () if replays && saved.fits_in(size) => None,
-            () if replays => Some("edits beyond it could not be made again"),
-            // Where the world ended, edits ended too.
-            () if !tail.is_empty() => Some(
-                "it was not closed properly, and its last edits can only be made again on a ground of its own size: open it over that \
-                 one, and close it, first",
-            ),
-            () => None,
-        };
-        if let Some(why) = why {
-            return Err(StoreError::GroundSize { saved: saved.to_string(), given: size.to_string(), why });
-        }
-    }
-    if base_changed == BaseChanged::Refuse {
-        other_level?;
-    }
-    if !is_same_ground && base_changed == BaseChanged::Refuse {
-        return Err(StoreError::BaseChanged {
-            regions: changed_regions(contents, &checkpoint, ground, level).len(),
-        });
-    }
-    let settings = checkpoint.metadata.settings;
-    let empty = || -> Result<Terrain, StoreError> { Ok(BaseLevel::first(level, ground, &settings)?) };
-    if !is_same_base && base_changed == BaseChanged::Replay && is_contiguous {
-        let work = replaying(progress, &whole);
-        let replayed = replay_good(empty, &GameData::new(), &whole, &contents.named, false, &work)?;
-        let regions = changed_regions(contents, &checkpoint, ground, level).len();
-        let mut recovered = Recovered::whole(replayed, level, &checkpoint);
-        recovered.findings.base_changed = Some((regions, "replayed"));
+    let recovery = Recovery::of(contents, ground, options)?;
+    recovery.check_base(options.base_changed)?;
+    let is_same_base = recovery.is_same_base;
+    if !is_same_base && options.base_changed == BaseChanged::Replay && recovery.is_contiguous {
+        let mut recovered = recovery.recovered_by_log(recovery.replay_log(false)?);
+        recovered.findings.base_changed = Some((recovery.changed_regions(), "replayed"));
         return Ok(recovered);
     }
 
-    let regions = contents.bytes_of(&checkpoint);
+    let regions = contents.bytes_of(&recovery.checkpoint);
     let end = if is_same_base { RECOVERED } else { RECOVERED_ANEW };
-    let work = Work::until(progress, end, (DECODE + RESTORE) * regions + REPLAY * bytes_of(&tail));
-    let grid = Terrain::new(Arc::clone(ground), &settings).map_err(RestoreError::from)?.world().grid();
-    let (mut parts, damaged) = load_regions(contents, &checkpoint, ground, level, grid, has_lost_rest, &work);
-    let mut is_rebuilt = false;
-    let is_lost = is_same_base && !damaged.is_empty() && !has_lost_rest;
-    if is_lost && is_contiguous && !reaches_back && contents.leads_to(&checkpoint) {
-        // Commits of another simulation can't be verified, but say what these regions held.
-        let before: Vec<&Frame> =
-            whole.iter().copied().filter(|frame| frame.number <= checkpoint.frame).collect();
-        let replayed = replay_good(empty, &GameData::new(), &before, &contents.named, false, &work)?;
-        is_rebuilt = replayed.refused.is_none();
-        if is_rebuilt {
-            take_regions(&mut parts, &damaged, &replayed.terrain.parts(), grid);
-        }
-    }
-    let restore = |parts: WorldParts| Terrain::restore(Arc::clone(ground), &settings, parts);
-    let restored = restore(parts.clone());
-    if let (false, Err(RestoreError::Parts(_))) = (is_same_base, &restored)
-        && let Some(saved) = reach(&parts.change).filter(|reach| !reach.fits_in(size))
-    {
-        let saved = other_size.map_or_else(|| format!("at least {saved}"), |saved| saved.to_string());
-        let why = "it was dug beyond the rim of this one";
-        return Err(StoreError::GroundSize { saved, given: size.to_string(), why });
+    let total = (DECODE + RESTORE) * regions + REPLAY * bytes_of(&recovery.tail);
+    let work = Work::until(options.progress.as_ref(), end, total);
+    let grid = recovery.grid()?;
+    let (mut parts, damaged) = recovery.load_regions(grid, &work);
+    let is_rebuilt = recovery.rebuild_unverified(&mut parts, &damaged, grid, &work)?;
+    let restored = recovery.restore(parts.clone());
+    if !is_same_base && matches!(restored, Err(RestoreError::Parts(_))) {
+        recovery.check_rim(&parts)?;
     }
     work.advance(RESTORE * regions);
-    let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == checkpoint.metadata.hash);
-    if is_same_base && !is_exact && is_log_whole {
-        let work = replaying(progress, &whole);
-        let replayed = replay_good(empty, &GameData::new(), &whole, &contents.named, true, &work)?;
+    let hash = recovery.checkpoint.metadata.hash;
+    let is_exact = restored.as_ref().is_ok_and(|terrain| terrain.world().hash() == hash);
+    if is_same_base && !is_exact && recovery.is_log_whole {
+        let replayed = recovery.replay_log(true)?;
         // Behind what can't be replayed, the checkpoint may know more.
-        if replayed.frame >= checkpoint.frame {
-            let mut recovered = Recovered::whole(replayed, level, &checkpoint);
+        if replayed.frame >= recovery.checkpoint.frame {
+            let mut recovered = recovery.recovered_by_log(replayed);
             recovered.is_log_whole = true;
-            recovered.findings = Findings { damaged, ..Findings::default() };
+            recovered.findings.damaged = damaged;
             return Ok(recovered);
         }
     }
-    let terrain = restored?;
-    let is_checked = is_same_base && is_exact && !is_replayed && !is_rebuilt;
-    let game = checkpoint.metadata.game.iter().cloned().collect::<GameData>();
-    let hash = terrain.world().hash();
-    let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), level.cloned());
-    let mut restored = Some(terrain);
-    let begin = || -> Result<Terrain, StoreError> {
-        match restored.take() {
-            Some(terrain) => Ok(terrain),
-            None => Ok(restore(parts.clone())?),
-        }
+    let is_checked = is_same_base && is_exact && !recovery.is_replayed && !is_rebuilt;
+    let mut recovered = recovery.replay_tail(restored?, &parts, is_checked, &work)?;
+    recovered.findings = Findings {
+        damaged,
+        is_lossy: !is_checked && !is_rebuilt,
+        base_changed: (!is_same_base).then(|| (recovery.changed_regions(), "kept")),
+        replayed: recovery.is_replayed.then_some(recovered.replayed),
+        has_lost_rest: recovery.has_lost_rest,
     };
-    let replayed = replay_good(begin, &game, &tail, &contents.named, is_checked, &work)?;
-    let frame = replayed.frame.max(checkpoint.frame);
-    let regions = changed_regions(contents, &checkpoint, ground, level).len();
-    if is_checked {
-        mirror.set_revisions(&checkpoint.regions);
-        mirror.mark_saved();
-        replayed.records.iter().for_each(|record| mirror.apply(record));
-        mirror.game = replayed.game;
-    } else {
-        mirror = mirror_of(&replayed.terrain, replayed.game, level, &checkpoint);
-    }
-    Ok(Recovered {
-        terrain: replayed.terrain,
-        mirror,
-        frame,
-        checkpoint: if is_checked { checkpoint.frame } else { 0 },
-        replayed: replayed.commits,
-        is_log_whole: is_log_whole && is_checked,
-        has_other_log,
-        is_new: !is_checked,
-        findings: Findings {
-            damaged,
-            is_lossy: !is_checked && !is_rebuilt,
-            base_changed: (!is_same_base).then_some((regions, "kept")),
-            replayed: is_replayed.then_some(replayed.commits),
+    Ok(recovered)
+}
+
+/// A world that is being recovered: its sources, and the facts that decide how, before any region is decoded.
+struct Recovery<'a> {
+    contents: &'a Contents,
+    ground: &'a Arc<Ground>,
+    /// The level below the world, if it is based on one.
+    level: Option<&'a BaseLevel>,
+    progress: Option<&'a Progress>,
+    /// The checkpoint to begin with.
+    checkpoint: Checkpoint,
+    /// Whether no checkpoint was found, so that everything but the regions is lost.
+    has_lost_rest: bool,
+    /// The frames from the first on for as long as none is missing.
+    whole: Vec<&'a Frame>,
+    /// The frames after the checkpoint.
+    tail: Vec<&'a Frame>,
+    /// Whether `whole` reaches the checkpoint.
+    is_contiguous: bool,
+    /// Whether `whole` reaches the checkpoint, and all of it was written on the present ground and level.
+    reaches_back: bool,
+    /// Whether `whole` reaches the checkpoint, and leads elsewhere.
+    has_other_log: bool,
+    /// Whether damaged regions can be rebuilt from the log.
+    is_log_whole: bool,
+    /// Whether the ground and the level are those that the world was saved with.
+    is_same_base: bool,
+    /// Whether commits after the checkpoint were made by another simulation: they can be replayed, but not verified.
+    is_replayed: bool,
+}
+
+impl<'a> Recovery<'a> {
+    /// Chooses the checkpoint and the level, and compares them with the journal and the ground.
+    fn of(
+        contents: &'a Contents,
+        ground: &'a Arc<Ground>,
+        options: &'a StoreOptions,
+    ) -> Result<Self, StoreError> {
+        let found = contents.choose_checkpoint();
+        let has_lost_rest = found.is_none();
+        let checkpoint = match found {
+            Some(checkpoint) => checkpoint,
+            None if options.salvage => contents.assume_checkpoint(),
+            None => {
+                let why = "neither journal nor database hold a valid checkpoint";
+                return Err(StoreError::Unreadable(why.into()));
+            }
+        };
+        let given = options.level.as_ref();
+        let level = match has_lost_rest {
+            false => BaseLevel::needed(checkpoint.level.as_ref(), given)?,
+            true if !contents.is_on_level() => None,
+            true => {
+                let missing = || StoreError::LevelMissing { label: "unknown".into() };
+                Some(given.ok_or_else(missing)?)
+            }
+        };
+        let whole = contents.frames_from(1);
+        let is_contiguous = whole.last().map_or(0, |last| last.number) >= checkpoint.frame;
+        let base = segment::base(ground.hash(), level.map(BaseLevel::name));
+        let reaches_back = contents.reaches_back(checkpoint.frame, base);
+        let has_other_log = reaches_back && !has_lost_rest && !contents.leads_to(&checkpoint);
+        let is_log_whole = match has_lost_rest {
+            false => reaches_back && !has_other_log,
+            true => reaches_back && contents.reaches(checkpoint.metadata.revision),
+        };
+        let tail = contents.frames_from(checkpoint.frame + 1);
+        let is_same_ground = checkpoint.metadata.ground == ground.hash() || has_lost_rest;
+        let is_same_base = is_same_ground && BaseLevel::expect(level, checkpoint.level.as_ref()).is_ok();
+        Ok(Self {
+            contents,
+            ground,
+            level,
+            progress: options.progress.as_ref(),
             has_lost_rest,
-        },
-        refused: replayed.refused,
-    })
+            is_contiguous,
+            reaches_back,
+            has_other_log,
+            is_log_whole,
+            is_same_base,
+            is_replayed: is_same_base && tail.iter().any(|frame| frame.base != base),
+            checkpoint,
+            whole,
+            tail,
+        })
+    }
+
+    /// Checks that the world can continue on this ground and level, and may.
+    fn check_base(&self, base_changed: BaseChanged) -> Result<(), StoreError> {
+        let size = GroundSize::of(self.ground);
+        if let Some(saved) = self.other_size() {
+            let replays = base_changed == BaseChanged::Replay && self.is_contiguous;
+            let why = match () {
+                () if base_changed == BaseChanged::Refuse => {
+                    Some("only the ground that it was saved with is allowed")
+                }
+                () if replays && saved.fits_in(size) => None,
+                () if replays => Some("edits beyond it could not be made again"),
+                // Where the world ended, edits ended too.
+                () if !self.tail.is_empty() => Some(
+                    "it was not closed properly, and its last edits can only be made again on a ground of its own size: open it over that \
+                     one, and close it, first",
+                ),
+                () => None,
+            };
+            if let Some(why) = why {
+                return Err(StoreError::GroundSize {
+                    saved: saved.to_string(),
+                    given: size.to_string(),
+                    why,
+                });
+            }
+        }
+        if base_changed == BaseChanged::Refuse {
+            BaseLevel::expect(self.level, self.checkpoint.level.as_ref())?;
+            if !self.is_same_base {
+                return Err(StoreError::BaseChanged { regions: self.changed_regions() });
+            }
+        }
+        Ok(())
+    }
+
+    /// Refuses a world on a smaller ground, beyond whose rim it was dug.
+    fn check_rim(&self, parts: &WorldParts) -> Result<(), StoreError> {
+        let size = GroundSize::of(self.ground);
+        let Some(reach) = reach(&parts.change).filter(|reach| !reach.fits_in(size)) else { return Ok(()) };
+        let saved = self.other_size().map_or_else(|| format!("at least {reach}"), |saved| saved.to_string());
+        let why = "it was dug beyond the rim of this one";
+        Err(StoreError::GroundSize { saved, given: size.to_string(), why })
+    }
+
+    /// The size of the ground that the world was saved with, if it is known and another than that of the present one.
+    fn other_size(&self) -> Option<GroundSize> {
+        self.checkpoint.cells.filter(|saved| *saved != GroundSize::of(self.ground))
+    }
+
+    /// The number of saved regions over changed ground; all of them, if the level is another.
+    fn changed_regions(&self) -> usize {
+        changed_regions(self.contents, &self.checkpoint, self.ground, self.level).len()
+    }
+
+    /// The chunks of the world.
+    fn grid(&self) -> Result<ChunkGrid, StoreError> {
+        let terrain = Terrain::new(Arc::clone(self.ground), &self.checkpoint.metadata.settings);
+        Ok(terrain.map_err(RestoreError::from)?.world().grid())
+    }
+
+    /// The world before its first commit.
+    fn first(&self) -> Result<Terrain, StoreError> {
+        Ok(BaseLevel::first(self.level, self.ground, &self.checkpoint.metadata.settings)?)
+    }
+
+    /// A world of these parts.
+    fn restore(&self, parts: WorldParts) -> Result<Terrain, RestoreError> {
+        Terrain::restore(Arc::clone(self.ground), &self.checkpoint.metadata.settings, parts)
+    }
+
+    /// The parts of the world that the checkpoint has, and the regions that can't be read.
+    fn load_regions(&self, grid: ChunkGrid, work: &Work) -> (WorldParts, Vec<RegionPos>) {
+        let (checkpoint, has_lost_rest) = (&self.checkpoint, self.has_lost_rest);
+        load_regions(self.contents, checkpoint, self.ground, self.level, grid, has_lost_rest, work)
+    }
+
+    /// Takes damaged regions from a replay of the commits up to the checkpoint, if the log can't rebuild them otherwise;
+    /// returns whether it did. Commits of another simulation can't be verified, but say what these regions held.
+    fn rebuild_unverified(
+        &self,
+        parts: &mut WorldParts,
+        damaged: &[RegionPos],
+        grid: ChunkGrid,
+        work: &Work,
+    ) -> Result<bool, StoreError> {
+        let is_lost = self.is_same_base && !damaged.is_empty() && !self.has_lost_rest;
+        let is_unverified = self.is_contiguous && !self.reaches_back;
+        if !is_lost || !is_unverified || !self.contents.leads_to(&self.checkpoint) {
+            return Ok(false);
+        }
+        let is_before = |frame: &&Frame| frame.number <= self.checkpoint.frame;
+        let before: Vec<&Frame> = self.whole.iter().copied().filter(is_before).collect();
+        let (game, named) = (GameData::new(), &self.contents.named);
+        let replayed = replay_good(|| self.first(), &game, &before, named, false, work)?;
+        let is_rebuilt = replayed.refused.is_none();
+        if is_rebuilt {
+            take_regions(parts, damaged, &replayed.terrain.parts(), grid);
+        }
+        Ok(is_rebuilt)
+    }
+
+    /// Replays the log from the first commit on, and compares the world with each commit if `is_checked`.
+    fn replay_log(&self, is_checked: bool) -> Result<Replayed, StoreError> {
+        let work = replaying(self.progress, &self.whole);
+        let (game, named) = (GameData::new(), &self.contents.named);
+        replay_good(|| self.first(), &game, &self.whole, named, is_checked, &work)
+    }
+
+    /// A world that was replayed from its first commit.
+    fn recovered_by_log(&self, replayed: Replayed) -> Recovered {
+        Recovered {
+            mirror: mirror_of(&replayed.terrain, replayed.game, self.level, &self.checkpoint),
+            terrain: replayed.terrain,
+            frame: replayed.frame,
+            checkpoint: 0,
+            replayed: replayed.commits,
+            is_log_whole: false,
+            has_other_log: false,
+            is_new: true,
+            findings: Findings::default(),
+            refused: replayed.refused,
+        }
+    }
+
+    /// Replays the commits after the checkpoint on a terrain that was restored from these parts. Unless `is_checked`,
+    /// commits are not compared with it, and the whole world counts as changed.
+    fn replay_tail(
+        &self,
+        terrain: Terrain,
+        parts: &WorldParts,
+        is_checked: bool,
+        work: &Work,
+    ) -> Result<Recovered, StoreError> {
+        let game = self.checkpoint.metadata.game.iter().cloned().collect::<GameData>();
+        let (grid, hash) = (terrain.world().grid(), terrain.world().hash());
+        let mut mirror = Mirror::new(grid, terrain.parts(), hash, game.clone(), self.level.cloned());
+        let mut restored = Some(terrain);
+        let begin = || -> Result<Terrain, StoreError> {
+            match restored.take() {
+                Some(terrain) => Ok(terrain),
+                None => Ok(self.restore(parts.clone())?),
+            }
+        };
+        let replayed = replay_good(begin, &game, &self.tail, &self.contents.named, is_checked, work)?;
+        if is_checked {
+            mirror.set_revisions(&self.checkpoint.regions);
+            mirror.mark_saved();
+            replayed.records.iter().for_each(|record| mirror.apply(record));
+            mirror.game = replayed.game;
+        } else {
+            mirror = mirror_of(&replayed.terrain, replayed.game, self.level, &self.checkpoint);
+        }
+        Ok(Recovered {
+            terrain: replayed.terrain,
+            mirror,
+            frame: replayed.frame.max(self.checkpoint.frame),
+            checkpoint: if is_checked { self.checkpoint.frame } else { 0 },
+            replayed: replayed.commits,
+            is_log_whole: self.is_log_whole && is_checked,
+            has_other_log: self.has_other_log,
+            is_new: !is_checked,
+            findings: Findings::default(),
+            refused: replayed.refused,
+        })
+    }
 }
 
 /// The mirror of a world that takes the place of all records of a checkpoint.
@@ -259,22 +398,6 @@ impl Recovered {
     /// The sizes of its chunks and voxels.
     pub fn settings(&self) -> TerrainSettings {
         TerrainSettings { chunk_size: self.mirror.chunk_size(), voxel_size: self.terrain.voxel_size() }
-    }
-
-    /// A world that was replayed from its first commit.
-    fn whole(replayed: Replayed, level: Option<&BaseLevel>, checkpoint: &Checkpoint) -> Self {
-        Self {
-            mirror: mirror_of(&replayed.terrain, replayed.game, level, checkpoint),
-            terrain: replayed.terrain,
-            frame: replayed.frame,
-            checkpoint: 0,
-            replayed: replayed.commits,
-            is_log_whole: false,
-            has_other_log: false,
-            is_new: true,
-            findings: Findings::default(),
-            refused: replayed.refused,
-        }
     }
 }
 

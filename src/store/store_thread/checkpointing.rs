@@ -44,17 +44,7 @@ impl Writer {
         self.state.after_gap = had_gap;
         self.state.written = None;
         self.state.changed = None;
-        let mut records = Vec::with_capacity(dirty.len() + 1);
-        // Only the first one is waited for, when a world is opened or created.
-        let progress = self.options.progress.clone();
-        let work = Work::until(progress.as_ref(), SAVED, dirty.len() as u64);
-        for (at, region) in dirty {
-            records.push((keys::region(at), region.map(|region| self.encode(at, &region))));
-            work.advance(1);
-            if let Some(messages) = messages {
-                self.listen(messages);
-            }
-        }
+        let mut records = self.encode_regions(dirty, messages);
         for key in keys::CHECKPOINTS {
             let sealed = frame::seal(Kind::Checkpoint, self.world, key, revision, 0, &checkpoint);
             records.push((key.to_vec(), Some(sealed)));
@@ -80,11 +70,36 @@ impl Writer {
         if !self.state.has_gap {
             self.succeed();
         }
+        self.trim_journal(revision, &checkpoint)
+    }
+
+    /// The records of regions, by key. Accepts messages meanwhile.
+    fn encode_regions(
+        &mut self,
+        regions: Vec<(RegionPos, Option<Region>)>,
+        messages: Option<&Receiver<Message>>,
+    ) -> Vec<(Vec<u8>, Option<Vec<u8>>)> {
+        let mut records = Vec::with_capacity(regions.len() + 1);
+        // Only the first one is waited for, when a world is opened or created.
+        let progress = self.options.progress.clone();
+        let work = Work::until(progress.as_ref(), SAVED, regions.len() as u64);
+        for (at, region) in regions {
+            records.push((keys::region(at), region.map(|region| self.encode(at, &region))));
+            work.advance(1);
+            if let Some(messages) = messages {
+                self.listen(messages);
+            }
+        }
+        records
+    }
+
+    /// Copies a checkpoint next to the journal, and removes what the journal no longer needs.
+    fn trim_journal(&mut self, revision: u64, checkpoint: &[u8]) -> Result<(), StoreError> {
         if self.journal.is_long(self.options.log_bytes) {
             self.begin_segment();
         }
         self.shared.begin_waiting(CHECKPOINT_TIME);
-        let copied = checkpoint_copy::write(&*self.files, self.world, revision, &checkpoint);
+        let copied = checkpoint_copy::write(&*self.files, self.world, revision, checkpoint);
         let trimmed = self.journal.trim(self.options.log_bytes, self.checkpoints[0]);
         self.shared.end_waiting();
         copied.and(trimmed).map_err(|error| self.fail(&error.to_string()))

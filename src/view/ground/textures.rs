@@ -276,25 +276,7 @@ impl GroundLoading {
             find("albedo", albedo).and_then(|layers| Ok(layers.zip(find("relief", relief)?)))
         };
         match find_both(&textures) {
-            Ok(Some((albedo, relief))) => {
-                self.failure = None;
-                // The renderer takes over images and materials in any order: it may still have the old version of an
-                // image that was repaired in this frame.
-                if !std::mem::replace(&mut self.was_sound, true) {
-                    return;
-                }
-                self.is_current = true;
-                let misfit = ArrayMismatch::find([albedo, relief], looks.iter());
-                if let Some(misfit) = misfit
-                    && self.misfit != Some(misfit)
-                {
-                    warn!("the arrays of GroundTextures don't fit: {misfit}");
-                }
-                self.misfit = misfit;
-                if self.ready.as_ref() != Some(&textures) {
-                    self.ready = Some(textures);
-                }
-            }
+            Ok(Some((albedo, relief))) => self.use_textures(textures, [albedo, relief], looks),
             // Not loaded yet, or removed.
             Ok(None) => (self.is_current, self.was_sound, self.failure) = (false, false, None),
             Err(failure) => {
@@ -303,6 +285,27 @@ impl GroundLoading {
                 }
                 self.fail(failure);
             }
+        }
+    }
+
+    /// Uses textures that can be drawn with, and have these many layers: albedo and relief.
+    fn use_textures(&mut self, textures: Textures, layers: [u32; 2], looks: &Query<(Entity, &GroundLook)>) {
+        self.failure = None;
+        // The renderer takes over images and materials in any order: it may still have the old version of an
+        // image that was repaired in this frame.
+        if !std::mem::replace(&mut self.was_sound, true) {
+            return;
+        }
+        self.is_current = true;
+        let misfit = ArrayMismatch::find(layers, looks.iter());
+        if let Some(misfit) = misfit
+            && self.misfit != Some(misfit)
+        {
+            warn!("the arrays of GroundTextures don't fit: {misfit}");
+        }
+        self.misfit = misfit;
+        if self.ready.as_ref() != Some(&textures) {
+            self.ready = Some(textures);
         }
     }
 

@@ -16,12 +16,13 @@ use super::device::{Fault, Launch};
 use super::layout::{self, EditJob, EditParams, EditResult, MOST_LIST};
 use super::lists::fill;
 use super::session::{Session, Uploads};
-use super::staging::{StagingLayout, StrataInput};
+use super::staging::{Section, StagingLayout, StrataInput};
 use crate::edits::{EditDelta, EditEffect, PreparedEdit, PreparedEdits, enter_effects};
 use crate::lattice::side_by_side;
 use images::ImageInput;
 use output::{LONG, Target, Totals};
-use stencil::Look;
+use stencil::{Look, StencilInput};
+use surface::SurfaceInput;
 
 /// From this many entries on, plain lists are copied in parallel.
 const LONG_LIST: usize = 1 << 14;
@@ -42,6 +43,20 @@ const KEPT_JOBS: usize = 1 << 16;
 
 /// Maximum number of passes. Each one doubles lists whose required length is unknown.
 const PASSES: usize = 12;
+
+/// The input of edits, and the sections that it is written to.
+struct EditInput<'w, 'a> {
+    plan: StagingLayout,
+    job_list: Section,
+    record_list: Section,
+    /// The numbers of the edits of all jobs.
+    edit_list: Section,
+    counters: Section,
+    strata: StrataInput,
+    images: ImageInput<'w>,
+    surface: Option<SurfaceInput<'a>>,
+    stencil: Option<StencilInput<'a>>,
+}
 
 impl Session {
     /// Applies edits and returns what they changed, brick by brick. No edit may read what an earlier one may write.
@@ -93,6 +108,7 @@ impl Session {
         delta
     }
 
+    /// Applies edits in as many passes as their lists need. Slots for bricks are added to `targets`.
     fn run_edits<'a>(
         &mut self,
         work: &PreparedEdits<'a>,
@@ -103,41 +119,9 @@ impl Session {
     ) -> Result<Option<EditDelta>, Fault> {
         // Stencil edits look up their bricks in the windows instead.
         self.list_edits(work, jobs, look.is_none(), uploads)?;
-        let mut images = ImageInput::new(work);
-        let mut surface = self.surface_input(work, jobs, uploads)?;
-        let stencil = look.map(|look| self.stencil_input(work, look, jobs, uploads, &mut images));
-        let mut stencil = stencil.transpose()?;
-        if images.is_full() {
-            return Err(Fault::TooLarge(work.jobs().len()));
-        }
-        let mut plan = StagingLayout::default();
-        uploads.plan(&mut plan);
-        let job_list = plan.section::<EditJob>(jobs.len());
-        let record_list = plan.section::<layout::EditRecord>(work.edits.len());
-        let edits = plan.section::<u32>(work.jobs().len());
-        let counters = plan.section::<u32>(4);
-        let strata = StrataInput::plan(work.base.ground(), &mut plan);
-        images.plan(&mut plan);
-        surface.iter_mut().for_each(|surface| surface.plan(&mut plan));
-        stencil.iter_mut().for_each(|stencil| stencil.plan(&mut plan));
-        self.input.open(&mut *self.device, &plan)?;
-        let (all_jobs, edit_records, list) = self.input.entries_of(job_list, record_list, edits);
-        let are_many = jobs.len() >= LONG;
-        let (bricks, device) = (&mut self.bricks, &mut self.device);
-        let take = || {
-            bricks.take_many(&mut **device, jobs, all_jobs, targets, |job, target| EditJob { target, ..*job })
-        };
-        let write_lists = || {
-            fill(&work.edits, edit_records, MANY, |number, own| record(own, images.numbers.of(number)));
-            fill(work.jobs(), list, LONG_LIST, |_, job| job.edit);
-        };
-        side_by_side(are_many, take, write_lists).0?;
-        self.input.entries::<u32>(counters).fill(0);
-        strata.put(&mut self.input);
-        images.put(&mut self.input);
-        surface.iter_mut().for_each(|surface| surface.put(&mut self.input, &mut self.kept));
-        stencil.iter_mut().for_each(|stencil| stencil.put(&mut self.input, &mut self.kept));
-        if let Some(surface) = &surface {
+        let mut input = self.plan_edits(work, jobs, look, uploads)?;
+        self.stage_edits(work, jobs, &mut input, targets)?;
+        if let Some(surface) = &input.surface {
             self.reserve_surface(surface)?;
         }
         let is_long = jobs.len() >= COPIED || work.jobs().len() >= COPIED_JOBS;
@@ -145,50 +129,9 @@ impl Session {
         self.edits.reserve(&mut *self.device, Totals::default(), is_long)?;
 
         for _ in 0..PASSES {
-            self.edits.parts.wipe();
-            self.edits.counts.wipe();
-            self.send(&plan, uploads)?;
-            let distances = surface.as_ref().map(|surface| self.launch_surface(surface)).transpose()?;
-            let [grids, images] = images.addresses(&self.input);
-            let params = EditParams {
-                bricks: self.bricks.base(),
-                stacks: self.stacks.base(),
-                jobs: self.input.address(job_list),
-                list: self.input.address(edits),
-                edit_records: self.input.address(record_list),
-                results: self.edits.results.address(),
-                records: self.edits.records.address(),
-                materials: self.edits.materials.address(),
-                parts: self.edits.parts.address(),
-                counts: self.edits.counts.address(),
-                counters: self.input.address(counters),
-                record_capacity: self.edits.records.capacity(),
-                material_capacity: self.edits.materials.capacity(),
-                part_capacity: self.edits.parts.capacity(),
-                count_capacity: self.edits.counts.capacity(),
-                strata: strata.address(&self.input),
-                grids,
-                images,
-            };
-            let blocks = jobs.len() as u32;
-            match &stencil {
-                // SAFETY: the parameters are sections of the input and lists of the session with their capacities.
-                // None of them is accessed before the wait below.
-                None => unsafe { self.device.launch(Launch::new(blocks, &params)) }?,
-                Some(stencil) => {
-                    let params = stencil.params(params, distances.unwrap_or_default(), &self.input);
-                    // SAFETY: as above.
-                    unsafe { self.device.launch(Launch::new(blocks, &params)) }?;
-                }
-            }
-            self.edits.results.fetch(&mut *self.device, jobs.len())?;
-            if !self.edits.parts.is_mapped() {
-                self.edits.totals.read(&mut *self.device, self.input.address(counters), 4)?;
-            }
-            self.device.wait()?;
-            self.times = self.device.times();
+            self.launch_edits(jobs.len(), &input, uploads)?;
             let totals = self.edits.totals(jobs.len());
-            if stencil.is_some() && self.edits.is_too_far(jobs.len()) {
+            if input.stencil.is_some() && self.edits.is_too_far(jobs.len()) {
                 return Ok(None);
             }
             if !self.edits.reserve(&mut *self.device, totals, is_long)? {
@@ -201,6 +144,114 @@ impl Session {
         }
         // The device works, but lists that doubled in each pass were still too short.
         Err(Fault::TooLarge(work.jobs().len()))
+    }
+
+    /// Collects the input of the jobs, and lays it out.
+    fn plan_edits<'w, 'a>(
+        &mut self,
+        work: &'w PreparedEdits<'a>,
+        jobs: &mut [EditJob],
+        look: Option<Look>,
+        uploads: &mut Uploads<'a>,
+    ) -> Result<EditInput<'w, 'a>, Fault> {
+        let mut images = ImageInput::new(work);
+        let mut surface = self.surface_input(work, jobs, uploads)?;
+        let stencil = look.map(|look| self.stencil_input(work, look, jobs, uploads, &mut images));
+        let mut stencil = stencil.transpose()?;
+        if images.is_full() {
+            return Err(Fault::TooLarge(work.jobs().len()));
+        }
+        let mut plan = StagingLayout::default();
+        uploads.plan(&mut plan);
+        let job_list = plan.section::<EditJob>(jobs.len());
+        let record_list = plan.section::<layout::EditRecord>(work.edits.len());
+        let edit_list = plan.section::<u32>(work.jobs().len());
+        let counters = plan.section::<u32>(4);
+        let strata = StrataInput::plan(work.base.ground(), &mut plan);
+        images.plan(&mut plan);
+        surface.iter_mut().for_each(|surface| surface.plan(&mut plan));
+        stencil.iter_mut().for_each(|stencil| stencil.plan(&mut plan));
+        Ok(EditInput { plan, job_list, record_list, edit_list, counters, strata, images, surface, stencil })
+    }
+
+    /// Takes slots for the bricks of the jobs, and writes the input.
+    fn stage_edits(
+        &mut self,
+        work: &PreparedEdits,
+        jobs: &[EditJob],
+        of: &mut EditInput,
+        targets: &mut Vec<Target>,
+    ) -> Result<(), Fault> {
+        self.input.open(&mut *self.device, &of.plan)?;
+        let (all_jobs, edit_records, list) = self.input.entries_of(of.job_list, of.record_list, of.edit_list);
+        let are_many = jobs.len() >= LONG;
+        let (bricks, device, grids) = (&mut self.bricks, &mut self.device, &of.images.numbers);
+        let take = || {
+            bricks.take_many(&mut **device, jobs, all_jobs, targets, |job, target| EditJob { target, ..*job })
+        };
+        let write_lists = || {
+            fill(&work.edits, edit_records, MANY, |number, own| record(own, grids.of(number)));
+            fill(work.jobs(), list, LONG_LIST, |_, job| job.edit);
+        };
+        side_by_side(are_many, take, write_lists).0?;
+        self.input.entries::<u32>(of.counters).fill(0);
+        of.strata.put(&mut self.input);
+        of.images.put(&mut self.input);
+        of.surface.iter_mut().for_each(|surface| surface.put(&mut self.input, &mut self.kept));
+        of.stencil.iter_mut().for_each(|stencil| stencil.put(&mut self.input, &mut self.kept));
+        Ok(())
+    }
+
+    /// Launches one pass of this many jobs, and waits for its results.
+    fn launch_edits(&mut self, jobs: usize, of: &EditInput, uploads: &Uploads) -> Result<(), Fault> {
+        self.edits.parts.wipe();
+        self.edits.counts.wipe();
+        self.send(&of.plan, uploads)?;
+        let distances = of.surface.as_ref().map(|surface| self.launch_surface(surface)).transpose()?;
+        let params = self.edit_params(of);
+        let blocks = jobs as u32;
+        match &of.stencil {
+            // SAFETY: the parameters are sections of the input and lists of the session with their capacities.
+            // None of them is accessed before the wait below.
+            None => unsafe { self.device.launch(Launch::new(blocks, &params)) }?,
+            Some(stencil) => {
+                let params = stencil.params(params, distances.unwrap_or_default(), &self.input);
+                // SAFETY: as above.
+                unsafe { self.device.launch(Launch::new(blocks, &params)) }?;
+            }
+        }
+        self.edits.results.fetch(&mut *self.device, jobs)?;
+        if !self.edits.parts.is_mapped() {
+            self.edits.totals.read(&mut *self.device, self.input.address(of.counters), 4)?;
+        }
+        self.device.wait()?;
+        self.times = self.device.times();
+        Ok(())
+    }
+
+    /// The kernel's parameters, for the present lists of the session.
+    fn edit_params(&self, of: &EditInput) -> EditParams {
+        let [grids, images] = of.images.addresses(&self.input);
+        EditParams {
+            bricks: self.bricks.base(),
+            stacks: self.stacks.base(),
+            jobs: self.input.address(of.job_list),
+            list: self.input.address(of.edit_list),
+            edit_records: self.input.address(of.record_list),
+            results: self.edits.results.address(),
+            records: self.edits.records.address(),
+            materials: self.edits.materials.address(),
+            parts: self.edits.parts.address(),
+            counts: self.edits.counts.address(),
+            counters: self.input.address(of.counters),
+            record_capacity: self.edits.records.capacity(),
+            material_capacity: self.edits.materials.capacity(),
+            part_capacity: self.edits.parts.capacity(),
+            count_capacity: self.edits.counts.capacity(),
+            strata: of.strata.address(&self.input),
+            grids,
+            images,
+        }
     }
 
     /// Converts the results to a delta. Bricks are copied while everything else is processed.

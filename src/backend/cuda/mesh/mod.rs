@@ -6,7 +6,7 @@ use super::device::{Fault, Launch};
 use super::layout::{self, ColumnJob, MOST_JOBS, MeshJob, MeshParams};
 use super::lists::{cut, fill, for_each_parallel, map};
 use super::session::{Session, Stacks, Uploads, windows};
-use super::staging::{StagingLayout, StrataInput};
+use super::staging::{Section, StagingLayout, StrataInput};
 use super::windows::Windows;
 use crate::ground::Ground;
 use crate::lattice::{pieces, side_by_side};
@@ -25,6 +25,19 @@ struct Piece<'b> {
 
 /// A stack of bricks by position, and its slot.
 type Column = ((i32, i32), u32);
+
+/// The input of blocks, and the sections that it was written to.
+struct MeshInput<'a> {
+    windows: Windows<'a>,
+    /// The material mix of all vertices if it is uniform.
+    plain: Option<MaterialMix>,
+    plan: StagingLayout,
+    window_list: Section,
+    column_list: Section,
+    job_list: Section,
+    counters: Section,
+    strata: StrataInput,
+}
 
 /// From this many blocks or stacks on, they are processed in parallel.
 const LONG: usize = 256;
@@ -67,6 +80,44 @@ impl Session {
         if blocks.len() > MOST_JOBS {
             return Err(Fault::TooLarge(blocks.len()));
         }
+        let input = self.stage_mesh(view, blocks, uploads)?;
+        self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
+        self.meshes.lists.reserve(&mut *self.device, (0, 0), is_long)?;
+
+        for _ in 0..2 {
+            self.send(&input.plan, uploads)?;
+            let params = self.mesh_params(view, &input);
+            // SAFETY: the parameters are sections of the input and lists of the session with their capacities. None
+            // of them is accessed before the wait below.
+            unsafe { self.device.launch(Launch::new(blocks.len() as u32, &params)) }?;
+            self.meshes.results.fetch(&mut *self.device, blocks.len())?;
+            overlap();
+            self.device.wait()?;
+            self.times = self.device.times();
+            let extents = self.meshes.extents(blocks.len());
+            let all = extents.last().copied().unwrap_or_default();
+            let lists = &mut self.meshes.lists;
+            if !lists.reserve(&mut *self.device, all.totals(), is_long)? {
+                // Results locate the surfaces, so check them before use.
+                if !all.is_in_lists() {
+                    return Err(Fault::Failed("surfaces beyond the ends of their lists".into()));
+                }
+                let marks = lists.begin_fetch(&mut *self.device, &extents, input.plain.is_none())?;
+                self.kept.put(input.windows);
+                return Ok(Meshed { plain: input.plain, marks });
+            }
+            // A second pass, with enough room.
+        }
+        Err(Fault::Failed("results changed from one pass to the next".into()))
+    }
+
+    /// Looks up the bricks and stacks of blocks, and writes the input.
+    fn stage_mesh<'a>(
+        &mut self,
+        view: &WorldView<'a>,
+        blocks: &[Block],
+        uploads: &mut Uploads<'a>,
+    ) -> Result<MeshInput<'a>, Fault> {
         let ground = view.samples.ground();
         let (found, mut windows) = side_by_side(
             blocks.len() >= LONG,
@@ -95,54 +146,33 @@ impl Session {
         });
         self.input.entries::<u32>(counters).fill(0);
         strata.put(&mut self.input);
-        self.meshes.results.reserve(&mut *self.device, blocks.len(), is_long)?;
-        self.meshes.lists.reserve(&mut *self.device, (0, 0), is_long)?;
+        Ok(MeshInput { windows, plain, plan, window_list, column_list, job_list, counters, strata })
+    }
 
-        for _ in 0..2 {
-            self.send(&plan, uploads)?;
-            let params = MeshParams {
-                bricks: self.bricks.base(),
-                stacks: self.stacks.base(),
-                windows: self.input.address(window_list),
-                columns: self.input.address(column_list),
-                jobs: self.input.address(job_list),
-                table: self.table,
-                results: self.meshes.results.address(),
-                positions: self.meshes.lists.positions.address(),
-                normals: self.meshes.lists.normals.address(),
-                mixes: if plain.is_some() { 0 } else { self.meshes.lists.mixes.address() },
-                indices: self.meshes.lists.indices.address(),
-                counters: self.input.address(counters),
-                vertex_capacity: self.meshes.lists.vertex_capacity(),
-                index_capacity: self.meshes.lists.indices.capacity(),
-                width: view.grid.width(),
-                depth: view.grid.depth(),
-                single: layout::single_mix(ground),
-                pad: 0,
-                strata: strata.address(&self.input),
-            };
-            // SAFETY: the parameters are sections of the input and lists of the session with their capacities. None
-            // of them is accessed before the wait below.
-            unsafe { self.device.launch(Launch::new(blocks.len() as u32, &params)) }?;
-            self.meshes.results.fetch(&mut *self.device, blocks.len())?;
-            overlap();
-            self.device.wait()?;
-            self.times = self.device.times();
-            let extents = self.meshes.extents(blocks.len());
-            let all = extents.last().copied().unwrap_or_default();
-            let lists = &mut self.meshes.lists;
-            if !lists.reserve(&mut *self.device, all.totals(), is_long)? {
-                // Results locate the surfaces, so check them before use.
-                if !all.is_in_lists() {
-                    return Err(Fault::Failed("surfaces beyond the ends of their lists".into()));
-                }
-                let marks = lists.begin_fetch(&mut *self.device, &extents, plain.is_none())?;
-                self.kept.put(windows);
-                return Ok(Meshed { plain, marks });
-            }
-            // A second pass, with enough room.
+    /// The kernel's parameters, for the present lists of the session.
+    fn mesh_params(&self, view: &WorldView, of: &MeshInput) -> MeshParams {
+        let lists = &self.meshes.lists;
+        MeshParams {
+            bricks: self.bricks.base(),
+            stacks: self.stacks.base(),
+            windows: self.input.address(of.window_list),
+            columns: self.input.address(of.column_list),
+            jobs: self.input.address(of.job_list),
+            table: self.table,
+            results: self.meshes.results.address(),
+            positions: lists.positions.address(),
+            normals: lists.normals.address(),
+            mixes: if of.plain.is_some() { 0 } else { lists.mixes.address() },
+            indices: lists.indices.address(),
+            counters: self.input.address(of.counters),
+            vertex_capacity: lists.vertex_capacity(),
+            index_capacity: lists.indices.capacity(),
+            width: view.grid.width(),
+            depth: view.grid.depth(),
+            single: layout::single_mix(view.samples.ground()),
+            pad: 0,
+            strata: of.strata.address(&self.input),
         }
-        Err(Fault::Failed("results changed from one pass to the next".into()))
     }
 }
 
