@@ -13,7 +13,7 @@ use crate::store::checkpoints::{Checkpoint, GroundSize, Mirror};
 use crate::store::error::{StoreError, StoreWarning};
 use crate::store::journal::segment::{self, Frame};
 use crate::store::options::{BaseChanged, StoreOptions};
-use crate::store::progress::Work;
+use crate::store::progress::{Progress, Work};
 use crate::store::regions::keys;
 use crate::store::store_thread::GameData;
 use crate::terrain::{RestoreError, Terrain, TerrainSettings, WorldParts};
