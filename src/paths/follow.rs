@@ -59,9 +59,9 @@ mod tests {
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
     use crate::navigation::{WalkSettings, WalkableTile};
-    use crate::paths::{NavigationArea, NavigationPlugin, archipelago_options};
+    use crate::paths::{NavigationArea, NavigationPlugin};
     use crate::plugin::BurrowSettings;
-    use crate::terrain::TerrainSettings;
+    use crate::terrain::{TerrainSettings, World};
 
     /// A dig in the middle of the tile with this number along x and z.
     fn dig(tile: i32) -> Brush {
@@ -78,7 +78,7 @@ mod tests {
         app.finish();
         app.cleanup();
         let agent = WalkSettings::default();
-        let archipelago = app.world_mut().spawn(Archipelago3d::new(archipelago_options(&agent, 1.0))).id();
+        let archipelago = app.world_mut().spawn(Archipelago3d::new(agent.archipelago_options(1.0))).id();
         let ground = Ground::flat(160, 160, 10.0).expect("valid ground");
         let terrain = Terrain::new(ground, &TerrainSettings::default()).expect("valid settings");
         let terrain = app.world_mut().spawn(terrain).id();
@@ -104,6 +104,10 @@ mod tests {
         app.world().get(navigation).expect("`Navigation` requires it")
     }
 
+    fn model(app: &App, terrain: Entity) -> &World {
+        app.world().get::<Terrain>(terrain).expect("it is there").world()
+    }
+
     /// The number of the build that made each tile.
     fn builds(app: &App, navigation: Entity) -> BTreeMap<NavTilePos, u64> {
         tiles(app, navigation).tiles.iter().map(|(&pos, tile)| (pos, tile.build)).collect()
@@ -120,9 +124,8 @@ mod tests {
             app.world_mut().write_message(dig(tile)).expect("the plugin added it");
             app.update();
         }
-        let model = |app: &App| app.world().get::<Terrain>(terrain).expect("it is there");
-        run_until(&mut app, |app| model(app).world().revision() > 0);
-        assert_eq!(model(&app).world().revision(), 2, "both are committed in one frame");
+        run_until(&mut app, |app| model(app, terrain).revision() > 0);
+        assert_eq!(model(&app, terrain).revision(), 2, "both are committed in one frame");
         run_until(&mut app, |app| !tiles(app, navigation).is_building());
         let rebuilt: Vec<NavTilePos> = builds(&app, navigation)
             .into_iter()
@@ -134,7 +137,7 @@ mod tests {
         let tiles = tiles(&app, navigation);
         let walker = tiles.walker.as_ref().expect("valid settings");
         for (&pos, tile) in &tiles.tiles {
-            let polygons = WalkableTile::new(model(&app).world(), pos, walker).polygons();
+            let polygons = WalkableTile::new(model(&app, terrain), pos, walker).polygons();
             assert_eq!(tile.polygons.as_deref(), Some(&polygons), "{pos:?}");
         }
     }

@@ -5,7 +5,6 @@ use std::path::Path;
 
 use bevy::mesh::VertexAttributeValues;
 use bevy::prelude::*;
-use bevy_burrow::plugin::ATTRIBUTE_SKY_LIGHT;
 use bevy_burrow::prelude::*;
 
 use crate::lod::{levels, mountains};
@@ -25,7 +24,8 @@ fn drawn(stage: &mut Stage) -> Vec<[Corner; 3]> {
         let mesh = meshes.get(&mesh.0).expect("it is shown");
         let places = mesh.attribute(Mesh::ATTRIBUTE_POSITION).and_then(VertexAttributeValues::as_float3);
         let places = places.expect("each mesh has positions");
-        let Some(VertexAttributeValues::Unorm8x4(light)) = mesh.attribute(ATTRIBUTE_SKY_LIGHT) else {
+        let Some(VertexAttributeValues::Unorm8x4(light)) = mesh.attribute(Terrain::ATTRIBUTE_SKY_LIGHT)
+        else {
             panic!("a mesh has no light");
         };
         let corner = |index: usize| -> Corner {

@@ -17,7 +17,7 @@ use crate::plugin::diagnostics::measure_commit;
 use crate::plugin::entities::{Display, TerrainEntities};
 use crate::plugin::figures::{MainThread, TaskTimes, start_measuring, stop_measuring};
 use crate::plugin::lod_state::{LodState, ShownLevels, Watchers};
-use crate::plugin::meshes::{BuildSettings, BuiltSurface, VertexExtras, VertexKind};
+use crate::plugin::meshes::{BuildSettings, BuiltNode, BuiltSurface, VertexExtras, VertexKind};
 use crate::plugin::reports::{Report, Reports};
 use crate::plugin::{
     BrushApplied, BurrowEngine, BurrowFigures, BurrowSettings, Held, LoosePieceFound, MaterialColors,

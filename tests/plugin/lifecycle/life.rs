@@ -33,7 +33,7 @@ impl Expected {
         };
         let mut plain = model();
         match load {
-            Load::Loose => plain.set_loose(Some(loose().into())),
+            Load::Loose => plain.set_loose(Some(loose())),
             #[cfg(feature = "store")]
             Load::StartLevel => {
                 plain.apply((0..3).map(|number| {
