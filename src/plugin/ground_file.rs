@@ -12,7 +12,7 @@ use bevy::reflect::TypePath;
 use serde::{Deserialize, Serialize};
 
 use super::heightmap::{read_limited, register_loader};
-use super::{BeforeLoad, EditOutbox};
+use super::{BeforeLoad, EditOutbox, Phase};
 use crate::ground::{
     ElevationGrid, ElevationScale, ElevationTile, Ground, GroundError, HeightFormat, IdOptions, ImportError,
     ImportOptions, MaterialControl, MaterialMap, SplatOptions, TileEdges,
@@ -282,7 +282,7 @@ fn register(app: &mut App) {
     if register_loader::<GroundLoader>(app) {
         app.add_message::<GroundFileRead>()
             .add_observer(forget_followed)
-            .add_systems(Update, follow_ground_files.before(BeforeLoad::Worlds));
+            .add_systems(Phase::Worlds, follow_ground_files.before(BeforeLoad::Worlds));
     }
 }
 

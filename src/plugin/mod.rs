@@ -96,6 +96,7 @@ pub use picking::TerrainPickingPlugin;
 pub use query::{TerrainHit, Terrains};
 #[cfg(any(feature = "scatter", feature = "landmass"))]
 pub(crate) use schedule::commit::GroundChanged;
+pub(crate) use schedule::phases::Phase;
 pub use schedule::redraw::Redraw;
 pub(crate) use schedule::same_frame::CommitSameFrame;
 pub use settings::{BurrowEngine, BurrowSettings};
@@ -149,7 +150,7 @@ pub enum BurrowSystems {
     Propagate,
 }
 
-/// Systems in [`Update`] before [`BurrowSystems::Load`], which run in every frame.
+/// Systems before [`BurrowSystems::Load`], which run in every frame: of [`Update`], and of [`Phase::Worlds`].
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(not(all(feature = "store", feature = "avian")), allow(dead_code, reason = "one for each feature"))]
 pub(crate) enum BeforeLoad {
@@ -253,6 +254,13 @@ fn add_observers(app: &mut App) {
 
 /// Orders the sets in `Update`, and adds their systems.
 fn add_update_systems(app: &mut App) {
+    let phases = (
+        Phase::Worlds.system(app).in_set(BeforeLoad::Worlds),
+        Phase::Load.system(app).in_set(BurrowSystems::Load),
+        Phase::Collect.system(app).in_set(BurrowSystems::Collect),
+        Phase::Begin.system(app).in_set(BurrowSystems::Begin),
+        Phase::Propagate.system(app).in_set(BurrowSystems::Propagate),
+    );
     app.configure_sets(
         Update,
         (
@@ -266,24 +274,21 @@ fn add_update_systems(app: &mut App) {
         )
             .chain(),
     )
+    .add_systems(Update, (phases, commit::commit_transactions.in_set(BurrowSystems::Commit)))
     .add_systems(
-        Update,
+        Phase::Load,
         (
-            (
-                places::scale_terrains,
-                outdated::drop_stray_tasks,
-                outdated::drop_replaced,
-                load::start_loading,
-                places::place_terrains,
-                lod::find_eyes,
-                load::finish_loading,
-                lod::keep_wanted_tiles,
-            )
-                .chain()
-                .in_set(BurrowSystems::Load),
-            (collect::collect_brushes, collect::collect_steps).chain().in_set(BurrowSystems::Collect),
-            commit::commit_transactions.in_set(BurrowSystems::Commit),
-            (lod::begin_lod_changes, commit::begin_transactions).chain().in_set(BurrowSystems::Begin),
-        ),
-    );
+            places::scale_terrains,
+            outdated::drop_stray_tasks,
+            outdated::drop_replaced,
+            load::start_loading,
+            places::place_terrains,
+            lod::find_eyes,
+            load::finish_loading,
+            lod::keep_wanted_tiles,
+        )
+            .chain(),
+    )
+    .add_systems(Phase::Collect, (collect::collect_brushes, collect::collect_steps).chain())
+    .add_systems(Phase::Begin, (lod::begin_lod_changes, commit::begin_transactions).chain());
 }

@@ -48,7 +48,7 @@ pub(crate) use reading::{ReadWorld, WorldReader};
 use bevy::prelude::*;
 use bevy::window::ExitSystems;
 
-use crate::plugin::{BeforeLoad, BurrowSystems, register_loader};
+use crate::plugin::{BeforeLoad, BurrowSystems, Phase, register_loader};
 
 /// Commits are handed to the store, in `Update`. What a game [puts](WorldStore::put) before this is saved with the
 /// commits of this frame.
@@ -61,6 +61,7 @@ pub struct SavePlugin;
 
 impl Plugin for SavePlugin {
     fn build(&self, app: &mut App) {
+        let save = Phase::Save.system(app).in_set(SaveSystems);
         app.add_message::<SaveNow>()
             .add_message::<WorldOpened>()
             .add_message::<WorldSaved>()
@@ -78,22 +79,22 @@ impl Plugin for SavePlugin {
             .add_observer(closing::close_with_component)
             .add_observer(closing::follow_discarded)
             .configure_sets(Update, SaveSystems.after(BurrowSystems::Begin).before(BurrowSystems::Propagate))
+            .add_systems(Update, save)
             .add_systems(
-                Update,
+                Phase::Worlds,
                 (
-                    (
-                        opening::follow_changed,
-                        making::start_levels,
-                        opening::finish_opening,
-                        opening::start_opening,
-                        opening::warn_of_no_terrain,
-                    )
-                        .chain()
-                        .in_set(BeforeLoad::Worlds),
-                    (saving::save_commits, saving::save_now, saving::report, closing::report_closed)
-                        .chain()
-                        .in_set(SaveSystems),
-                ),
+                    opening::follow_changed,
+                    making::start_levels,
+                    opening::finish_opening,
+                    opening::start_opening,
+                    opening::warn_of_no_terrain,
+                )
+                    .chain()
+                    .in_set(BeforeLoad::Worlds),
+            )
+            .add_systems(
+                Phase::Save,
+                (saving::save_commits, saving::save_now, saving::report, closing::report_closed).chain(),
             )
             .add_systems(Last, saving::finish_at_exit.after(ExitSystems));
         register_loader::<LevelLoader>(app);

@@ -4,9 +4,9 @@
 use bevy::prelude::*;
 
 use super::propagate::{Overruled, PropagateSteps, propagate_to_ground, propagate_to_pieces};
-use crate::plugin::TerrainReady;
 use crate::plugin::components::Materials;
 use crate::plugin::reports::{Report, Reported, Reports};
+use crate::plugin::{Phase, TerrainReady};
 use crate::terrain::Terrain;
 
 /// The precedence of a look, which all other materials make way for.
@@ -43,8 +43,10 @@ pub(crate) fn propagate_look<M: Material>(app: &mut App) {
 fn choose<M: Material>(app: &mut App, bit: usize) {
     app.init_resource::<MaterialTypes>().init_resource::<Reported>();
     if app.world().resource::<MaterialTypes>().0.is_empty() {
-        app.configure_sets(Update, NoteMaterials.in_set(PropagateSteps::Choose))
-            .add_systems(Update, warn_of_several.in_set(PropagateSteps::Choose).after(NoteMaterials));
+        app.configure_sets(Phase::Propagate, NoteMaterials.in_set(PropagateSteps::Choose)).add_systems(
+            Phase::Propagate,
+            warn_of_several.in_set(PropagateSteps::Choose).after(NoteMaterials),
+        );
     }
     app.world_mut().resource_mut::<MaterialTypes>().0.push((bit, std::any::type_name::<M>()));
     let note = move |mut terrains: Query<(&mut Materials, Has<MeshMaterial3d<M>>), With<Terrain>>| {
@@ -73,7 +75,7 @@ fn choose<M: Material>(app: &mut App, bit: usize) {
             }
         };
     app.add_systems(
-        Update,
+        Phase::Propagate,
         (
             // They write different bits.
             note.in_set(NoteMaterials).ambiguous_with(NoteMaterials),
@@ -105,7 +107,7 @@ fn warn_of_several(
 /// Adds a system that logs terrains whose material has textures: meshes of ground have no texture coordinates.
 pub(crate) fn warn_of_textures(app: &mut App) {
     app.init_resource::<Reported>().add_systems(
-        Update,
+        Phase::Propagate,
         warn_of_unused_textures
             .after(PropagateSteps::Propagate)
             .run_if(resource_exists::<Assets<StandardMaterial>>),
@@ -147,7 +149,7 @@ pub(crate) fn warn_of_undrawn<L: Component>(app: &mut App) {
     app.init_resource::<Reported>()
         .init_resource::<MaterialTypes>()
         .add_observer(note)
-        .add_systems(Update, warn_of_nothing::<L>.after(PropagateSteps::Propagate));
+        .add_systems(Phase::Propagate, warn_of_nothing::<L>.after(PropagateSteps::Propagate));
 }
 
 /// A game may dress a terrain when it is ready, so this is asked a little later.

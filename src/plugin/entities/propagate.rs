@@ -18,7 +18,7 @@ use bevy::light::{NotShadowCaster, NotShadowReceiver};
 use bevy::prelude::*;
 
 use crate::plugin::schedule::same_frame::{PropagateSameFrame, SameFrame};
-use crate::plugin::{BurrowSystems, Chunk, GroundPiece, Tile};
+use crate::plugin::{Chunk, GroundPiece, Phase, Tile};
 use crate::terrain::Terrain;
 
 /// Propagates a component of any type from a terrain's entity to its tiles, chunks and [pieces](GroundPiece): when it
@@ -61,11 +61,8 @@ pub(crate) enum PropagateSteps {
 
 /// Adds the systems that propagate layers and shadows.
 pub(in crate::plugin) fn add(app: &mut App) {
-    app.configure_sets(
-        Update,
-        (PropagateSteps::Choose, PropagateSteps::Propagate).chain().in_set(BurrowSystems::Propagate),
-    )
-    .add_plugins(TerrainPropagatePlugin::<RenderLayers>::default());
+    app.configure_sets(Phase::Propagate, (PropagateSteps::Choose, PropagateSteps::Propagate).chain())
+        .add_plugins(TerrainPropagatePlugin::<RenderLayers>::default());
     #[cfg(feature = "render")]
     app.add_plugins((
         TerrainPropagatePlugin::<NotShadowCaster>::default(),
@@ -124,7 +121,7 @@ pub(super) fn propagate_to_pieces<C: Component + Clone>(app: &mut App) {
 /// Propagates a component of a terrain along a relationship when it is inserted, changed or removed.
 fn propagate<C: Component + Clone, R: Relationship, F: QueryFilter + 'static>(app: &mut App) {
     app.add_systems(
-        Update,
+        Phase::Propagate,
         (remove_inherited::<C, R>, insert_changed::<C, R, F>, insert_on_new::<C, R, F>)
             .chain()
             .in_set(PropagateSteps::Propagate),

@@ -7,6 +7,7 @@ pub(super) mod inbox;
 pub(super) mod load;
 pub(super) mod lod;
 pub(super) mod outdated;
+pub(super) mod phases;
 pub(super) mod redraw;
 pub(super) mod same_frame;
 pub(super) mod task;

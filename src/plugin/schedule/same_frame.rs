@@ -12,7 +12,7 @@ use bevy::ecs::system::SystemChangeTick;
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
-use crate::plugin::BurrowSystems;
+use crate::plugin::Phase;
 
 /// The transactions that began in this frame.
 #[derive(Resource, Default)]
@@ -76,8 +76,5 @@ pub(in crate::plugin) fn add(app: &mut App) {
             .before(VisibilitySystems::CalculateBounds)
             .before(VisibilitySystems::VisibilityPropagate),
     )
-    .add_systems(
-        Update,
-        (|mut same_frame: ResMut<SameFrame>| same_frame.propagates = true).in_set(BurrowSystems::Propagate),
-    );
+    .add_systems(Phase::Propagate, |mut same_frame: ResMut<SameFrame>| same_frame.propagates = true);
 }

@@ -49,8 +49,8 @@ use bevy::prelude::*;
 
 use super::vertex::VertexPlugin;
 use crate::plugin::{
-    BurrowSystems, GroundPiece, SkyLight, SlimVertices, propagate_look, remove_inherited, warn_of_textures,
-    warn_of_undrawn,
+    BurrowSystems, GroundPiece, Phase, SkyLight, SlimVertices, propagate_look, remove_inherited,
+    warn_of_textures, warn_of_undrawn,
 };
 use crate::terrain::Terrain;
 use material::GroundUniform;
@@ -74,8 +74,7 @@ impl Plugin for GroundPlugin {
         warn_of_undrawn::<GroundLook>(app);
         warn_of_textures(app);
         keep_materials(app);
-        app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
-            .add_systems(Update, textures::load_textures.before(add_materials).after(BurrowSystems::Begin));
+        app.add_plugins(MaterialPlugin::<GroundMaterial>::default());
     }
 
     fn finish(&self, app: &mut App) {
@@ -90,26 +89,21 @@ impl Plugin for GroundPlugin {
 
 /// Adds the systems that create materials and update them with terrains and looks.
 fn keep_materials(app: &mut App) {
-    app.add_systems(
-        Update,
-        (
-            (add_materials, remove_materials)
+    let look = Phase::Look.system(app).after(BurrowSystems::Begin).before(BurrowSystems::Propagate);
+    app.add_systems(Update, look)
+        .add_systems(Phase::Look, (textures::load_textures, add_materials, remove_materials).chain())
+        .add_systems(
+            Phase::Propagate,
+            (remove_inherited::<MeshMaterial3d<GroundMaterial>, GroundPiece>, pieces::add_materials).chain(),
+        )
+        // Transforms are final by then; a material that changes later shows only in the next frame.
+        .add_systems(
+            PostUpdate,
+            (note_color_maps, follow, pieces::follow)
                 .chain()
-                .after(BurrowSystems::Begin)
-                .before(BurrowSystems::Propagate),
-            (remove_inherited::<MeshMaterial3d<GroundMaterial>, GroundPiece>, pieces::add_materials)
-                .chain()
-                .in_set(BurrowSystems::Propagate),
-        ),
-    )
-    // Transforms are final by then; a material that changes later shows only in the next frame.
-    .add_systems(
-        PostUpdate,
-        (note_color_maps, follow, pieces::follow)
-            .chain()
-            .after(TransformSystems::Propagate)
-            .before(AssetEventSystems),
-    );
+                .after(TransformSystems::Propagate)
+                .before(AssetEventSystems),
+        );
 }
 
 /// The material that this plugin gave a terrain. A material that the game inserted is not removed.
