@@ -1,7 +1,8 @@
 //! The cost of digging on the main thread: `cargo bench --features examples --bench main_thread`.
 //!
-//! The real landscape in an app without a renderer, one sphere of radius 4 at a time, compared with idle frames; and
-//! the task's time until Bevy's meshes are ready, by chunk size. Vertices have depths, or with `-- slim` none; with
+//! The real landscape in an app without a renderer, one sphere of radius 4 at a time, compared with idle frames, and
+//! those with frames of the same app without this crate; and the task's time until Bevy's meshes are ready, by chunk
+//! size. Vertices have depths, or with `-- slim` none; with
 //! `-- light` they have the light of the sky. With `-- colliders`, all ground has colliders, in chunks of 32. With
 //! `-- repeated`, each dig is near the one before it. Printed first is the time until all of the landscape is there.
 
@@ -37,11 +38,18 @@ struct Times {
     transactions: Vec<Duration>,
 }
 
+/// An app without a terrain, and without anything that could show one.
+fn bare_app() -> App {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin));
+    app
+}
+
 /// An app whose terrain is loaded.
 fn app(ground: &Arc<Ground>, chunk_size: u32, is_slim: bool) -> App {
     let settings = TerrainSettings { chunk_size, ..default() };
-    let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin, BurrowPlugins));
+    let mut app = bare_app();
+    app.add_plugins(BurrowPlugins);
     #[cfg(feature = "avian")]
     if is_asked("colliders") {
         use avian3d::prelude::PhysicsPlugins;
@@ -104,7 +112,14 @@ fn main() {
     let sizes: &[u32] = if is_asked("colliders") { &[32] } else { &[32, 25, 50, 100] };
     let mut apps: Vec<_> =
         sizes.iter().map(|&size| (size, app(&ground, size, is_asked("slim")), Times::default())).collect();
+    let mut bare = bare_app();
+    let mut bare_frames = Vec::new();
     for (turn, i) in (0..500).enumerate() {
+        bare_frames.extend((0..3).map(|_| {
+            let start = Instant::now();
+            bare.update();
+            start.elapsed()
+        }));
         let (x, z) = match is_asked("repeated") {
             true => (500 + i * 5 % 40, 500 + i * 3 % 41),
             false => (40 + i * 389 % 1100, 40 + i * 211 % 940),
@@ -117,6 +132,7 @@ fn main() {
             times.dig(app, at);
         }
     }
+    report("whole frame, without this crate", bare_frames);
     for (size, _, times) in apps {
         if size == 32 {
             report("whole frame, nothing to do", times.idle);
