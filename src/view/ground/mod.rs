@@ -100,7 +100,7 @@ fn keep_materials(app: &mut App) {
         // Transforms are final by then; a material that changes later shows only in the next frame.
         .add_systems(
             PostUpdate,
-            (note_color_maps, follow, pieces::follow)
+            (note_color_maps.run_if(on_message::<AssetEvent<Image>>), follow, pieces::follow)
                 .chain()
                 .after(TransformSystems::Propagate)
                 .before(AssetEventSystems),
