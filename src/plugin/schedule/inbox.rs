@@ -23,7 +23,7 @@ impl<M: Message> Default for Unread<M> {
 }
 
 impl<M: Message + Clone> Unread<M> {
-    fn is_any(&self, messages: &Messages<M>) -> bool {
+    fn has_any(&self, messages: &Messages<M>) -> bool {
         !self.cursor.is_empty(messages)
     }
 
@@ -76,10 +76,10 @@ pub(in crate::plugin) fn has_unread(
     undos: Res<Messages<Undo>>,
     redos: Res<Messages<Redo>>,
 ) -> bool {
-    inbox.brushes.is_any(&brushes)
-        || inbox.targeted.is_any(&targeted)
-        || inbox.undos.is_any(&undos)
-        || inbox.redos.is_any(&redos)
+    inbox.brushes.has_any(&brushes)
+        || inbox.targeted.has_any(&targeted)
+        || inbox.undos.has_any(&undos)
+        || inbox.redos.has_any(&redos)
 }
 
 /// Stores messages of this frame. Runs in every frame, regardless of the game's run conditions.
