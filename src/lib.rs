@@ -312,6 +312,9 @@
 //! `BurrowSystems`, in `Update`: `Load`, `Collect`, `Commit`, `Begin`, `Propagate`. A brush that is sent before
 //! `Collect` starts in the same frame; its receipt comes in `Commit` of the frame in which its meshes are shown.
 //!
+//! Except for `Commit`, the systems of a set run one after the other within one exclusive system, and so do
+//! `SaveSystems`. No system of a game runs between them, and none of its commands are applied there.
+//!
 //! # Features
 //!
 //! | feature | what it adds | default |

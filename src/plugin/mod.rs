@@ -190,11 +190,12 @@ impl Plugin for TerrainPlugin {
                 .after(bevy::ecs::message::MessageUpdateSystems),
         );
         // In every frame, whatever the game gates.
-        app.add_systems(Last, (inbox::keep_requests, places::find_external_places))
+        app.add_systems(Last, (inbox::keep_requests.run_if(inbox::has_unread), places::find_external_places))
             // They read terrains, which systems in `Update` and `Last` change.
             .add_systems(
                 PostUpdate,
-                (diagnostics::measure_frame, engine::trim_engines).after(CommitSameFrame),
+                (diagnostics::measure_frame, engine::trim_engines.run_if(engine::is_time_to_trim))
+                    .after(CommitSameFrame),
             )
             // Terrains that were spawned before the plugin was added.
             .add_systems(PreStartup, (places::scale_terrains, places::place_terrains).chain());

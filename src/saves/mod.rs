@@ -96,7 +96,7 @@ impl Plugin for SavePlugin {
                 Phase::Save,
                 (saving::save_commits, saving::save_now, saving::report, closing::report_closed).chain(),
             )
-            .add_systems(Last, saving::finish_at_exit.after(ExitSystems));
+            .add_systems(Last, saving::finish_at_exit.after(ExitSystems).run_if(on_message::<AppExit>));
         register_loader::<LevelLoader>(app);
     }
 

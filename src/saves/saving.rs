@@ -91,13 +91,9 @@ pub(super) fn report(
 
 /// Saves everything before the app ends, also of worlds that are just being closed.
 pub(super) fn finish_at_exit(
-    mut exits: MessageReader<AppExit>,
     mut worlds: Query<(&mut Terrain, &mut WorldStore), Allow<Disabled>>,
     closing: Res<ClosingWorlds>,
 ) {
-    if exits.read().next().is_none() {
-        return;
-    }
     let end = Instant::now() + EXIT_WAIT;
     for (mut terrain, mut world) in &mut worlds {
         let is_of = world.store.as_ref().is_some_and(|store| store.is_of(&terrain));

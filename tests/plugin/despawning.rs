@@ -73,8 +73,8 @@ fn despawn_terrains(
     }
 }
 
-/// A stage whose game despawns terrains during the plugin's own systems: its command is applied just before the
-/// plugin's commands. Systems without an explicit order may be scheduled like that.
+/// A stage whose game despawns terrains among the plugin's own systems. Commands of a system without an explicit order
+/// may be applied just before those of the commit, or before any other set.
 fn stage_that_despawns<M>(
     despawn_terrains: impl IntoScheduleConfigs<bevy::ecs::system::ScheduleSystem, M>,
 ) -> Stage {
@@ -152,7 +152,7 @@ fn no_event_is_triggered_for_entities_despawned_with_their_terrain() {
 
 #[test]
 fn a_terrain_may_be_despawned_in_the_frame_that_would_show_it() {
-    let mut stage = stage_that_despawns(despawn_terrains.before_ignore_deferred(BurrowSystems::Load));
+    let mut stage = stage_that_despawns(despawn_terrains.before(BurrowSystems::Load));
     for rest in [false, true] {
         stage.spawn(steep());
         stage.frame();
@@ -168,7 +168,7 @@ fn a_terrain_may_be_despawned_in_the_frame_that_would_show_it() {
 
 #[test]
 fn a_terrain_may_be_despawned_in_the_frame_that_spawned_it() {
-    let mut stage = stage_that_despawns(despawn_terrains.before_ignore_deferred(BurrowSystems::Load));
+    let mut stage = stage_that_despawns(despawn_terrains.before(BurrowSystems::Load));
     stage.frame();
     stage.spawn(steep());
     stage.app.world_mut().resource_mut::<DespawnNow>().0 = true;
@@ -179,11 +179,7 @@ fn a_terrain_may_be_despawned_in_the_frame_that_spawned_it() {
 
 #[test]
 fn a_terrain_may_be_despawned_in_the_frame_of_a_brush() {
-    // The empty system makes Bevy apply the commit's commands before `despawn_terrains`, and adds none itself.
-    let despawn_terrains = (|| (), despawn_terrains)
-        .chain()
-        .after(BurrowSystems::Commit)
-        .before_ignore_deferred(BurrowSystems::Begin);
+    let despawn_terrains = despawn_terrains.after(BurrowSystems::Commit).before(BurrowSystems::Begin);
     let mut stage = stage_that_despawns(despawn_terrains);
     stage.show(steep());
     stage.send(dig(30.0, 4.0, 30.0, 6.0));

@@ -397,6 +397,29 @@ mod of_looks {
     }
 
     #[test]
+    fn materials_are_looked_at_once_they_are_propagated() {
+        #[derive(Resource)]
+        struct Open(bool);
+        let mut stage = stage();
+        stage.app.insert_resource(Open(false));
+        stage.app.configure_sets(Update, BurrowSystems::Propagate.run_if(|open: Res<Open>| open.0));
+        let mut terrain = Entity::PLACEHOLDER;
+        let (_, log) = logged(stage, |stage| {
+            let world = stage.app.world_mut();
+            let image = world.resource_mut::<Assets<Image>>().add(Image::default());
+            let material = StandardMaterial { base_color_texture: Some(image), ..default() };
+            let material = world.resource_mut::<Assets<StandardMaterial>>().add(material);
+            terrain = world.spawn((level(1.0), MeshMaterial3d(material))).id();
+            stage.settle();
+            stage.frames(4);
+            stage.app.world_mut().resource_mut::<Open>().0 = true;
+            stage.frames(4);
+        });
+        assert_eq!(log.count("nothing of it is drawn"), 0, "{}", log.text());
+        assert_logged(&log, &[terrain], "are not drawn", "texture coordinates");
+    }
+
+    #[test]
     fn burrow_plugins_before_those_of_bevy() {
         for is_before in [true, false] {
             let mut app = App::new();

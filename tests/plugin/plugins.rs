@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use bevy::app::ScheduleRunnerPlugin;
-use bevy::ecs::schedule::{ScheduleLabel, SystemKey};
+use bevy::ecs::schedule::SystemKey;
 use bevy::mesh::MeshPlugin;
 use bevy::prelude::*;
 use bevy_burrow::prelude::*;
@@ -71,9 +71,8 @@ fn debug_views_need_no_clock() {
 }
 
 /// Pairs of systems of a schedule that conflict and whose order is left open, with what they conflict about.
-fn ambiguities(app: &mut App, label: impl ScheduleLabel) -> Vec<String> {
-    let components = app.world().components();
-    let schedule = app.get_schedule(label).expect("it runs");
+fn ambiguities(world: &World, schedule: &Schedule) -> Vec<String> {
+    let components = world.components();
     // Without Bevy's feature `debug` systems have no names of their own.
     let systems = schedule.systems().expect("it ran");
     let names: HashMap<SystemKey, String> =
@@ -88,22 +87,27 @@ fn ambiguities(app: &mut App, label: impl ScheduleLabel) -> Vec<String> {
     conflicts.collect()
 }
 
-/// Adds the crate's plugins that a game may use in addition to physics, and checks the order of all systems.
+/// Checks the order of all systems in all schedules that ran, those within `Update` included.
 fn check_order(mut stage: Stage) {
     stage.show(level(1.0));
     stage.frames(2);
-    let app = &mut stage.app;
-    for found in [
-        ambiguities(app, First),
-        ambiguities(app, PreUpdate),
-        ambiguities(app, Update),
-        ambiguities(app, PostUpdate),
-        ambiguities(app, Last),
-    ] {
+    let world = stage.app.world();
+    let schedules = world.resource::<Schedules>();
+    let ran: Vec<&Schedule> = schedules
+        .iter()
+        .map(|(_, schedule)| schedule)
+        .filter(|schedule| schedule.systems().is_ok())
+        .collect();
+    let names: Vec<String> = ran.iter().map(|schedule| format!("{:?}", schedule.label())).collect();
+    for name in ["Update", "Worlds", "Load", "Collect", "Begin", "Propagate", "PostUpdate"] {
+        assert!(names.iter().any(|own| own == name), "{name} is not among {names:?}");
+    }
+    for (schedule, name) in ran.into_iter().zip(names) {
+        let found = ambiguities(world, schedule);
         // Where systems have no names, all of them count.
         let own: Vec<_> =
             found.iter().filter(|line| line.contains("burrow") || !line.contains("::")).collect();
-        assert!(own.is_empty(), "{own:#?}");
+        assert!(own.is_empty(), "{name}: {own:#?}");
     }
 }
 
@@ -111,6 +115,13 @@ fn check_order(mut stage: Stage) {
 fn all_systems_of_the_plugin_have_an_order() {
     check_order(Stage::server());
     check_order(Stage::drawing());
+}
+
+#[test]
+fn systems_of_a_game_need_no_order_relative_to_those_of_the_plugin() {
+    let mut stage = Stage::drawing();
+    stage.app.add_systems(Update, |mut frames: Local<u32>| *frames += 1);
+    check_order(stage);
 }
 
 #[cfg(feature = "debug")]

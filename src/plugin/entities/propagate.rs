@@ -50,7 +50,7 @@ impl<C: Component + Clone> Plugin for TerrainPropagatePlugin<C> {
     }
 }
 
-/// The steps of [`BurrowSystems::Propagate`], in this order.
+/// The steps of [`Phase::Propagate`], in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum PropagateSteps {
     /// Records the materials of terrains, and chooses one of several.
@@ -160,7 +160,7 @@ fn insert_on_new<C: Component + Clone, R: Relationship, F: QueryFilter>(
     }
 }
 
-/// Inserts the component on tiles and chunks that a commit spawned after [`BurrowSystems::Propagate`], and that have
+/// Inserts the component on tiles and chunks that a commit spawned after [`Phase::Propagate`], and that have
 /// none of their own.
 fn insert_on_spawned<C: Component + Clone>(
     mut commands: Commands,

@@ -13,17 +13,17 @@ use crate::threads::Threads;
 /// How often engines free memory that they have not used lately.
 const TRIMMED_EVERY: Duration = Duration::from_secs(30);
 
-/// Engines free memory at each transaction; this covers the time in which there are none.
-pub(in crate::plugin) fn trim_engines(
-    engine: Res<BurrowEngine>,
-    terrains: Query<&Terrain>,
-    mut last: Local<Option<Instant>>,
-) {
-    let since = *last.get_or_insert_with(Instant::now);
-    if since.elapsed() < TRIMMED_EVERY {
-        return;
+/// Whether it is time to trim engines again: a run condition.
+pub(in crate::plugin) fn is_time_to_trim(mut last: Local<Option<Instant>>) -> bool {
+    let is_time = last.get_or_insert_with(Instant::now).elapsed() >= TRIMMED_EVERY;
+    if is_time {
+        *last = Some(Instant::now());
     }
-    *last = Some(Instant::now());
+    is_time
+}
+
+/// Engines free memory at each transaction; this covers the time in which there are none.
+pub(in crate::plugin) fn trim_engines(engine: Res<BurrowEngine>, terrains: Query<&Terrain>) {
     let own = terrains.iter().filter_map(Terrain::engine);
     let opened = own.chain([&engine.0]).filter(|engine| matches!(engine.state(), EngineState::Cuda(_)));
     let opened: Vec<Engine> = opened.cloned().collect();

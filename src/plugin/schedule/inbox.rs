@@ -23,6 +23,10 @@ impl<M: Message> Default for Unread<M> {
 }
 
 impl<M: Message + Clone> Unread<M> {
+    fn has_any(&self, messages: &Messages<M>) -> bool {
+        !self.cursor.is_empty(messages)
+    }
+
     fn keep(&mut self, messages: &Messages<M>) {
         self.kept.extend(self.cursor.read(messages).cloned());
     }
@@ -62,6 +66,20 @@ impl Requests<'_> {
     pub fn take_steps(&mut self) -> (Vec<Undo>, Vec<Redo>) {
         (self.inbox.undos.take(&self.undos), self.inbox.redos.take(&self.redos))
     }
+}
+
+/// Whether there is a message that was neither kept nor taken: a run condition.
+pub(in crate::plugin) fn has_unread(
+    inbox: Res<Inbox>,
+    brushes: Res<Messages<Brush>>,
+    targeted: Res<Messages<TargetedBrush>>,
+    undos: Res<Messages<Undo>>,
+    redos: Res<Messages<Redo>>,
+) -> bool {
+    inbox.brushes.has_any(&brushes)
+        || inbox.targeted.has_any(&targeted)
+        || inbox.undos.has_any(&undos)
+        || inbox.redos.has_any(&redos)
 }
 
 /// Stores messages of this frame. Runs in every frame, regardless of the game's run conditions.

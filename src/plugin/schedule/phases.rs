@@ -3,12 +3,15 @@
 //! In most frames, most of the plugin's systems have nothing to do. In `Update` itself, each of them would be a task of
 //! its own, and every point between two of them where commands are applied a barrier: on two cores that took longer
 //! than all of their work.
+//!
+//! An exclusive system conflicts with every other one, so Bevy would report each system of a game that has no order
+//! relative to these. They are left out of its search; their schedules are not.
 
 use bevy::ecs::schedule::{ScheduleConfigs, ScheduleLabel, SingleThreadedExecutor};
 use bevy::ecs::system::ScheduleSystem;
 use bevy::prelude::*;
 
-/// The schedules, in the order in which they run.
+/// The schedules, in the order in which they run; [`Save`](Self::Save) and [`Look`](Self::Look) run in either order.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     not(all(feature = "store", feature = "render")),
@@ -38,6 +41,6 @@ impl Phase {
         app.edit_schedule(self, |schedule| {
             schedule.set_executor(SingleThreadedExecutor::new());
         });
-        (move |world: &mut World| world.run_schedule(self)).into_configs()
+        (move |world: &mut World| world.run_schedule(self)).ambiguous_with_all()
     }
 }

@@ -21,7 +21,8 @@ pub(in crate::plugin) struct SameFrame {
     begun: Vec<(Entity, u64, Instant)>,
     /// Meshes that commits have swapped in this frame.
     pub swapped: usize,
-    /// Whether the systems of [`BurrowSystems::Commit`] and [`BurrowSystems::Propagate`] ran: a game may gate them.
+    /// Whether the systems of [`Commit`](crate::plugin::BurrowSystems::Commit) and
+    /// [`Propagate`](crate::plugin::BurrowSystems::Propagate) ran: a game may gate them.
     commits: bool,
     propagates: bool,
     /// The tick after which a commit in this frame has spawned entities.

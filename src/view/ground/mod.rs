@@ -74,7 +74,8 @@ impl Plugin for GroundPlugin {
         warn_of_undrawn::<GroundLook>(app);
         warn_of_textures(app);
         keep_materials(app);
-        app.add_plugins(MaterialPlugin::<GroundMaterial>::default());
+        app.add_plugins(MaterialPlugin::<GroundMaterial>::default())
+            .add_systems(Phase::Look, textures::load_textures.before(add_materials));
     }
 
     fn finish(&self, app: &mut App) {
@@ -91,7 +92,7 @@ impl Plugin for GroundPlugin {
 fn keep_materials(app: &mut App) {
     let look = Phase::Look.system(app).after(BurrowSystems::Begin).before(BurrowSystems::Propagate);
     app.add_systems(Update, look)
-        .add_systems(Phase::Look, (textures::load_textures, add_materials, remove_materials).chain())
+        .add_systems(Phase::Look, (add_materials, remove_materials).chain())
         .add_systems(
             Phase::Propagate,
             (remove_inherited::<MeshMaterial3d<GroundMaterial>, GroundPiece>, pieces::add_materials).chain(),
@@ -99,7 +100,7 @@ fn keep_materials(app: &mut App) {
         // Transforms are final by then; a material that changes later shows only in the next frame.
         .add_systems(
             PostUpdate,
-            (note_color_maps, follow, pieces::follow)
+            (note_color_maps.run_if(on_message::<AssetEvent<Image>>), follow, pieces::follow)
                 .chain()
                 .after(TransformSystems::Propagate)
                 .before(AssetEventSystems),

@@ -7,6 +7,7 @@ use super::look::GroundLook;
 use super::material::{GroundExtension, GroundMaterial};
 use super::textures::{GroundLoading, Textures};
 use crate::ground::Ground;
+use crate::plugin::{BurrowSystems, Phase};
 use crate::terrain::{Terrain, TerrainSettings};
 
 pub(super) fn textures(app: &mut App) -> Textures {
@@ -23,6 +24,8 @@ pub(super) fn app() -> App {
         .init_asset::<GroundMaterial>()
         .init_resource::<GroundLoading>();
     keep_materials(&mut app);
+    let propagate = Phase::Propagate.system(&mut app).in_set(BurrowSystems::Propagate);
+    app.add_systems(Update, propagate);
     let ready = textures(&mut app);
     app.world_mut().resource_mut::<GroundLoading>().ready = Some(ready);
     app
