@@ -244,7 +244,7 @@
 //! | modules | subject |
 //! | --- | --- |
 //! | `threads` | thread pools of the plugin |
-//! | [`lattice`], [`lod`], [`ground`] | coordinates, levels of detail, the pristine world |
+//! | [`lattice`], `lod`, [`ground`] | coordinates, levels of detail, the pristine world |
 //! | [`brush`], [`volume`], `edits` | brushes and edits, stored samples, edits applied to samples |
 //! | [`surface`], `dense` | marching cubes, heightmap and their seam; a mesher of plain arrays |
 //! | [`backend`] | engines on CPU and GPU |

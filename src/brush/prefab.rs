@@ -103,9 +103,9 @@ impl PrefabSample {
 
 /// A box of a world: the density and the material of each of its samples, and which of them were edited.
 ///
-/// [`World::copy`](crate::terrain::World::copy) makes one, and a brush pastes it: see [`Paste`](super::Paste). It is
-/// kept in a file by `Prefab::to_bytes` (feature `format`), and named by its [hash](Self::hash) in what is sent to
-/// clients.
+/// [`World::copy`](crate::terrain::World::copy) makes one, and a brush pastes it: see [`Paste`](super::Paste).
+/// `Prefab::to_bytes` (feature `format`) makes the bytes of a file of it. What is sent to clients names it by its
+/// [hash](Self::hash).
 #[derive(Clone)]
 pub struct Prefab {
     size: IVec3,

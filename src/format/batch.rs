@@ -259,7 +259,7 @@ fn read_commit(
             // Its change and hash follow.
             CHANGE => Order::Parts { change: Arc::default(), hash: None },
             GROUND => return Err(FormatError::Invalid("commit: it sets another ground, which no log holds")),
-            _ => return Err(FormatError::Invalid("entry of a commit")),
+            _ => return Err(FormatError::Invalid("order of a commit")),
         });
     }
     let mut commit = CommitRecord { number: 0, revision, hash: 0, orders, change: Arc::default() };

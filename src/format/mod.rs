@@ -46,9 +46,7 @@ pub(crate) mod residuals;
 pub use batch::Batch;
 pub use error::FormatError;
 pub use ids::WorldId;
-pub use level::Level;
-#[doc(hidden)]
-pub use level::LevelFiles;
+pub use level::{Level, LevelFiles};
 #[doc(hidden)]
 pub use metadata::Metadata;
 #[doc(hidden)]

@@ -8,6 +8,7 @@
 //! | [`Column`] | vertical lines of samples | voxel |
 //! | [`Column`] as a *cell* | squares between four columns, named by their lowest one | voxel |
 //! | [`BrickPos`] | cubes of 8x8x8 samples | 8 voxels |
+//! | [`RegionPos`] | cubes of 8x8x8 bricks | 64 voxels |
 //! | [`ChunkPos`], [`TilePos`] | cubes and columns of chunks | chunk size |
 //! | distance, height (`i32`) | densities and heights | [`ONE`] per voxel |
 //! | drawn position (`i32`) | mesh vertices, local to a chunk | [`SNAP`] per voxel |
@@ -26,7 +27,6 @@ pub use grid::ChunkGrid;
 pub use grid::{BrickPos, ChunkPos, TilePos};
 pub(crate) use parallel::{ItemCost, parallel_map, parallel_map_into, pieces, side_by_side};
 pub(crate) use places::{sort_by_place, sort_permutation};
-#[doc(hidden)]
 pub use region::RegionPos;
 pub(crate) use tables::{shrink_if_sparse, table_bytes};
 

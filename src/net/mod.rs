@@ -6,7 +6,7 @@
 //!
 //! | file | what it holds |
 //! | --- | --- |
-//! | [`message`] | messages between client and server |
+//! | `message` | messages between client and server |
 //! | `encoding` | the binary encoding of messages |
 //! | `bulk` | the bulk lane: regions and old entries, as one stream that is cut into pieces |
 //! | `regions` | regions as they are compared and sent |

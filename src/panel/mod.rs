@@ -264,7 +264,7 @@ fn forget_note(
 
 /// The terrains, and what the panel shows of them.
 #[derive(SystemParam)]
-struct Terrains<'w, 's> {
+struct PanelTerrains<'w, 's> {
     terrains: Query<'w, 's, (Entity, &'static Terrain)>,
     parts: Query<
         'w,
@@ -280,7 +280,7 @@ struct Terrains<'w, 's> {
     plants: Query<'w, 's, (&'static crate::plants::Plants, &'static crate::plants::ShownPlants)>,
 }
 
-impl Terrains<'_, '_> {
+impl PanelTerrains<'_, '_> {
     /// A line for each terrain, by entity.
     fn lines(&self) -> Vec<TerrainLine<'_>> {
         let line = |(entity, terrain)| {
@@ -331,7 +331,7 @@ fn draw(
     figures: Res<BurrowFigures>,
     survey: Res<Survey>,
     mut files: ResMut<Files>,
-    terrains: Terrains,
+    terrains: PanelTerrains,
     mut places: ResMut<PanelPlaces>,
     #[cfg(feature = "debug")] mut debug: Option<ResMut<crate::debug::BurrowDebug>>,
     mut actions: MessageWriter<PanelAction>,

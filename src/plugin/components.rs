@@ -204,11 +204,10 @@ pub struct EditOutbox {
 #[reflect(Component, Default)]
 pub struct SlimVertices;
 
-/// Whether the meshes of this terrain have [`Terrain::ATTRIBUTE_SKY_LIGHT`]: how much of the sky
-/// lights each vertex, so that pits, gullies and tunnels are darker than meadows, near and far, and as soon as they are
-/// dug. It takes 4 bytes a vertex. A `GroundLook` inserts it, unless the terrain has [`SkyLight::OFF`]; insert it
-/// yourself for a material of your own that reads the attribute. Servers and other apps without meshes compute no
-/// light.
+/// Whether the meshes of this terrain have [`Terrain::ATTRIBUTE_SKY_LIGHT`]: how much of the sky lights each vertex, so
+/// that pits, gullies and tunnels are darker than meadows, near and far, and as soon as they are dug. It takes 4 bytes
+/// a vertex. A `GroundLook` inserts it, unless the terrain has [`SkyLight::OFF`]; insert it yourself for a material of
+/// your own that reads the attribute. Servers and other apps without meshes compute no light.
 ///
 /// A terrain whose meshes have it or lose it is loaded again, and its former tiles and chunks stay until then.
 #[derive(Component, Reflect, Clone, Copy, Debug, PartialEq, Eq)]

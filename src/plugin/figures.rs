@@ -10,7 +10,7 @@ use super::Times;
 /// Recent statistics of the plugin. It counts as changed in frames with a commit; [`main_thread`](Self::main_thread)
 /// alone, which is measured in every frame, does not count.
 ///
-/// Bevy's [`DiagnosticsStore`](bevy::diagnostic::DiagnosticsStore) has more of them, for `LogDiagnosticsPlugin` and
+/// Bevy's [`DiagnosticsStore`](bevy::diagnostic::DiagnosticsStore) has figures too, for `LogDiagnosticsPlugin` and
 /// other tools: this type's constants are their paths. The bytes that a terrain takes are not measured in each frame,
 /// because every brick would be visited: ask [`Terrain::memory`](crate::terrain::Terrain::memory).
 #[derive(Resource, Reflect, Clone, Debug, Default, PartialEq, Eq)]

@@ -29,8 +29,9 @@ pub use files::{Files, Folder, Lock, OpenFile, Opening};
 pub use inspect::WorldInfo;
 #[doc(hidden)]
 pub use inspect::{WorldCheck, check_in, inspect_in, read_world, replay};
+pub use levels::RestoreLevelError;
 #[doc(hidden)]
-pub use levels::{RestoreLevelError, read_level_files};
+pub use levels::read_level_files;
 pub use open_store::{Opened, Store};
 pub use options::{BaseChanged, StoreOptions};
 pub use portable::WorldFile;

@@ -14,7 +14,7 @@ impl Terrain {
     /// drops those that wait. Once they hold more than `bytes` bytes, not counting images of stamps and prefabs, the
     /// oldest are dropped. A reader that finds a gap between [numbers](CommitRecord::number) or
     /// [revisions](CommitRecord::revision), or whose last record does not have the [world's
-    /// revision](super::World::revision), has to read [all of the world](Self::parts).
+    /// revision](super::World::revision), has to read all of the [world](Self::world).
     ///
     /// Rules and settings of loose pieces are logged with the first edit that obeys them, or once nothing
     /// waits.

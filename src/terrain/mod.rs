@@ -57,11 +57,11 @@ pub use crate::surface::ChunkSurface;
 pub(crate) use crate::world::brick_over;
 #[cfg(any(feature = "plugin", test))]
 pub(crate) use crate::world::unique;
-#[doc(hidden)]
-pub use crate::world::{GlbError, MeshKey, Version};
 pub use crate::world::{
-    Memory, Meshing, Patch, RayHit, Span, SplatMaps, TerrainError, TerrainSettings, World,
+    GlbError, Memory, Meshing, Patch, RayHit, Span, SplatMaps, TerrainError, TerrainSettings, World,
 };
+#[doc(hidden)]
+pub use crate::world::{MeshKey, Version};
 pub use commit::Commit;
 #[doc(hidden)]
 pub use draft::Draft;
@@ -76,13 +76,10 @@ pub(crate) use pending_display::PendingDisplay;
 #[cfg(feature = "plugin")]
 pub(crate) use queue::Together;
 pub use queue::WorkLimits;
-#[doc(hidden)]
-pub use receipt::ChunkScenario;
-pub use receipt::{Applied, OrderKind, Receipt, Rejection, ScenarioCounts};
+pub use receipt::{Applied, ChunkScenario, OrderKind, Receipt, Rejection, ScenarioCounts};
 pub use record::CommitRecord;
 #[doc(hidden)]
 pub use record::WorldParts;
-#[doc(hidden)]
 pub use replay::{ReplayError, RestoreError};
 #[doc(hidden)]
 pub use resolve::FieldChange;

@@ -40,8 +40,8 @@ pub enum Order {
         hash: Option<u64>,
     },
     /// Another ground of the same size lies below all edits. Edited samples, fields and names stay; pristine samples
-    /// are those of the new ground, and all is as if the world had been [restored](super::Terrain::restore) on it. The
-    /// undo history is cleared, all meshes are made again, and the receipt counts no voxels.
+    /// are those of the new ground, and all is as if the world had been restored on it. The undo history is cleared,
+    /// all meshes are made again, and the receipt counts no voxels.
     Ground(Arc<Ground>),
     /// Later edits obey these rules.
     Rules(Option<Arc<DiggingRules>>),

@@ -48,5 +48,4 @@ pub use ground::{
     GroundTexturesError,
 };
 pub use material::TerrainMaterialPlugin;
-#[doc(hidden)]
 pub use vertex::prepass_vertex_shader;

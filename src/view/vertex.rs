@@ -36,7 +36,7 @@ use bevy::shader::{ShaderRef, load_shader_library};
 ///
 /// Materials without a vertex shader of their own need nothing: there Bevy's shaders draw both passes.
 ///
-/// The shaders are there wherever [`GroundPlugin`](super::GroundPlugin) or any
+/// The shaders are there wherever `GroundPlugin` or any
 /// [`TerrainMaterialPlugin`](super::TerrainMaterialPlugin) is. They ignore skins and morph targets, which terrains do
 /// not have, and draw shadows too.
 pub fn prepass_vertex_shader() -> ShaderRef {

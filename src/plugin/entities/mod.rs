@@ -1,4 +1,5 @@
-//! The entities of a terrain: where they are, what they inherit from it, and what a commit changes on them.
+//! The entities of a terrain: where they are, what they inherit from it, and what a commit changes on them. Also which
+//! squares of ground are near cameras and sources.
 
 mod display;
 #[cfg(feature = "render")]

@@ -27,10 +27,10 @@ impl Terrain {
 
     /// The share of the sky that lights a vertex, 0..=1, in x: 1 on a plain, 0 in a cave; see
     /// [`World::sky_light`](crate::terrain::World::sky_light). In y how deep it lies below the surface that was there
-    /// before anyone dug, of which 1 is [`CUT_VOXELS`] or more. In z the share of the sky again or, if it is larger,
-    /// the share of level directions in which a vertex under a roof sees the open within 14 voxels, at most 5/16: what
-    /// lies there is lit, and lights the vertex. w is 0. Materials multiply ambient and indirect light by z,
-    /// reflections by x, and never the light of the sun. Only on terrains with [`SkyLight`](crate::plugin::SkyLight).
+    /// before anyone dug, of which 1 is 8 voxels or more. In z the share of the sky again or, if it is larger, the
+    /// share of level directions in which a vertex under a roof sees the open within 14 voxels, at most 5/16: what lies
+    /// there is lit, and lights the vertex. w is 0. Materials multiply ambient and indirect light by z, reflections by
+    /// x, and never the light of the sun. Only on terrains with [`SkyLight`](crate::plugin::SkyLight).
     pub const ATTRIBUTE_SKY_LIGHT: MeshVertexAttribute =
         MeshVertexAttribute::new("Vertex_BurrowSkyLight", 0x6275_7272_6f77_0004, VertexFormat::Unorm8x4);
 }

@@ -4,9 +4,8 @@
 //! 2. The old one is moved to quarantine, or removed where the new one holds all that it held.
 //! 3. The new one gets its name.
 //!
-//! At each moment at least one of them is complete. If a step was interrupted,
-//! [recovery](crate::store::regions::sources) reads the file that is there, and the next replacement finishes the step
-//! first.
+//! At each moment at least one of them is complete. If a step was interrupted, `store::regions::sources` reads the file
+//! that is there, and the next replacement finishes the step first.
 
 use std::io;
 

@@ -202,7 +202,7 @@ impl Session {
         Ok(())
     }
 
-    /// Launches one pass of this many jobs, and waits for its results.
+    /// Launches one pass of the staged jobs, of which there are this many, and waits for its results.
     fn launch_edits(&mut self, jobs: usize, of: &EditInput, uploads: &Uploads) -> Result<(), Fault> {
         self.edits.parts.wipe();
         self.edits.counts.wipe();
@@ -211,8 +211,8 @@ impl Session {
         let params = self.edit_params(of);
         let blocks = jobs as u32;
         match &of.stencil {
-            // SAFETY: the parameters are sections of the input and lists of the session with their capacities.
-            // None of them is accessed before the wait below.
+            // SAFETY: the parameters are sections of the input, which `stage_edits` wrote for this many jobs, and lists
+            // of the session with their capacities. None of them is accessed before the wait below.
             None => unsafe { self.device.launch(Launch::new(blocks, &params)) }?,
             Some(stencil) => {
                 let params = stencil.params(params, distances.unwrap_or_default(), &self.input);

@@ -87,8 +87,8 @@ impl Session {
         for _ in 0..2 {
             self.send(&input.plan, uploads)?;
             let params = self.mesh_params(view, &input);
-            // SAFETY: the parameters are sections of the input and lists of the session with their capacities. None
-            // of them is accessed before the wait below.
+            // SAFETY: the parameters are sections of the input, which `stage_mesh` wrote for these blocks, and lists of
+            // the session with their capacities. None of them is accessed before the wait below.
             unsafe { self.device.launch(Launch::new(blocks.len() as u32, &params)) }?;
             self.meshes.results.fetch(&mut *self.device, blocks.len())?;
             overlap();
