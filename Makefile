@@ -69,7 +69,7 @@ test-model:
 
 # Optimising the library with its tests takes longer than these tests do.
 test-plugin:
-	cargo test --config 'profile.release.package.bevy_burrow.opt-level=1' $(WITH_BEVY) --lib -- threads:: plugin:: saves:: together:: view:: physics:: panel:: debug:: plants:: paths:: brush::request:: brush::shapes::mesh_grid::
+	cargo test --config 'profile.release.package.bevy_burrow.opt-level=0' $(WITH_BEVY) --lib -- threads:: plugin:: saves:: together:: view:: physics:: panel:: debug:: plants:: paths:: brush::request:: brush::shapes::mesh_grid::
 	cargo test $(WITH_BEVY) $(PLUGIN_TESTS) --example digger --example minimal --example physics --example sculpt --example server --example together
 	cargo test $(WITH_BEVY) --doc
 
