@@ -49,9 +49,8 @@ pub(super) fn follow_commits(
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
-    use std::time::{Duration, Instant};
+    use std::time::Duration;
 
-    use bevy::mesh::MeshPlugin;
     use bevy_landmass::prelude::{Archipelago3d, Landmass3dPlugin};
 
     use super::*;
@@ -60,8 +59,8 @@ mod tests {
     use crate::ground::Ground;
     use crate::navigation::{WalkSettings, WalkableTile};
     use crate::paths::{NavigationArea, NavigationPlugin};
-    use crate::plugin::BurrowSettings;
-    use crate::terrain::{TerrainSettings, World};
+    use crate::plugin::test_app::{commit_two_in_a_frame, meshes_only, model, run_until};
+    use crate::terrain::TerrainSettings;
 
     /// A dig in the middle of the tile with this number along x and z.
     fn dig(tile: i32) -> Brush {
@@ -71,9 +70,8 @@ mod tests {
 
     /// An app with level ground of 5 x 5 tiles, all of which are loaded: the terrain and its navigation.
     fn app() -> (App, [Entity; 2]) {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
-            .add_plugins(Landmass3dPlugin::default().in_schedule(PreUpdate))
+        let mut app = meshes_only();
+        app.add_plugins(Landmass3dPlugin::default().in_schedule(PreUpdate))
             .add_plugins((BurrowPlugins, NavigationPlugin { wait: Duration::from_secs(60) }));
         app.finish();
         app.cleanup();
@@ -91,21 +89,8 @@ mod tests {
         (app, [terrain, navigation])
     }
 
-    fn run_until(app: &mut App, is_so: impl Fn(&App) -> bool) {
-        let start = Instant::now();
-        while !is_so(app) {
-            assert!(start.elapsed() < Duration::from_secs(60), "it never came");
-            app.update();
-            std::thread::sleep(Duration::from_millis(1));
-        }
-    }
-
     fn tiles(app: &App, navigation: Entity) -> &NavigationTiles {
         app.world().get(navigation).expect("`Navigation` requires it")
-    }
-
-    fn model(app: &App, terrain: Entity) -> &World {
-        app.world().get::<Terrain>(terrain).expect("it is there").world()
     }
 
     /// The number of the build that made each tile.
@@ -117,15 +102,7 @@ mod tests {
     fn after_two_commits_in_one_frame_only_tiles_near_them_are_built_again() {
         let (mut app, [terrain, navigation]) = app();
         let before = builds(&app, navigation);
-        // The first dig is committed in the frame after its own, in which the second begins and ends.
-        for (tile, seconds) in [(0, 0), (3, 60)] {
-            let same_frame = Duration::from_secs(seconds);
-            app.world_mut().resource_mut::<BurrowSettings>().same_frame = same_frame;
-            app.world_mut().write_message(dig(tile)).expect("the plugin added it");
-            app.update();
-        }
-        run_until(&mut app, |app| model(app, terrain).revision() > 0);
-        assert_eq!(model(&app, terrain).revision(), 2, "both are committed in one frame");
+        commit_two_in_a_frame(&mut app, terrain, [0, 3].map(dig));
         run_until(&mut app, |app| !tiles(app, navigation).is_building());
         let rebuilt: Vec<NavTilePos> = builds(&app, navigation)
             .into_iter()

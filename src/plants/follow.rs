@@ -73,16 +73,12 @@ pub(super) fn follow_commits(
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, Instant};
-
-    use bevy::mesh::MeshPlugin;
-
     use super::*;
     use crate::BurrowPlugins;
     use crate::brush::{Brush, Shape};
     use crate::ground::Ground;
     use crate::plants::{PlantSource, Plants, PlantsPlugin};
-    use crate::plugin::BurrowSettings;
+    use crate::plugin::test_app::{commit_two_in_a_frame, meshes_only, run_until};
     use crate::scatter::{PatchPos, ScatterRules, Species, ViewDistances};
     use crate::terrain::TerrainSettings;
 
@@ -100,9 +96,8 @@ mod tests {
 
     /// An app with a terrain all of whose grass is loaded.
     fn app() -> (App, Entity) {
-        let mut app = App::new();
-        app.add_plugins((MinimalPlugins, AssetPlugin::default(), MeshPlugin, TransformPlugin))
-            .add_plugins((BurrowPlugins, PlantsPlugin));
+        let mut app = meshes_only();
+        app.add_plugins((BurrowPlugins, PlantsPlugin));
         app.finish();
         app.cleanup();
         app.world_mut().spawn((PlantSource { radius: 90.0 }, Transform::from_xyz(48.0, 20.0, 48.0)));
@@ -114,15 +109,6 @@ mod tests {
             patches.is_some_and(|patches| patches.len() == 36) && !shown(app, terrain).is_loading()
         });
         (app, terrain)
-    }
-
-    fn run_until(app: &mut App, is_so: impl Fn(&App) -> bool) {
-        let start = Instant::now();
-        while !is_so(app) {
-            assert!(start.elapsed() < Duration::from_secs(60), "it never came");
-            app.update();
-            std::thread::sleep(Duration::from_millis(1));
-        }
     }
 
     fn shown(app: &App, terrain: Entity) -> &ShownPlants {
@@ -148,17 +134,7 @@ mod tests {
         patches.insert(dug.world(), far, in_far);
         let wrong = gone(&app, terrain, 5);
         assert!(wrong > 0);
-        // The first dig is committed in the frame after its own, in which the second begins and ends.
-        for (patch, seconds) in [(1, 0), (3, 60)] {
-            let same_frame = Duration::from_secs(seconds);
-            app.world_mut().resource_mut::<BurrowSettings>().same_frame = same_frame;
-            app.world_mut().write_message(dig(patch)).expect("the plugin added it");
-            app.update();
-        }
-        let revision =
-            |app: &App| app.world().get::<Terrain>(terrain).expect("it is there").world().revision();
-        run_until(&mut app, |app| revision(app) > 0);
-        assert_eq!(revision(&app), 2, "both are committed in one frame");
+        commit_two_in_a_frame(&mut app, terrain, [1, 3].map(dig));
         assert!(gone(&app, terrain, 1) > 0 && gone(&app, terrain, 3) > 0);
         (0..3).for_each(|_| app.update());
         assert_eq!(gone(&app, terrain, 5), wrong);

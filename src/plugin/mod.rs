@@ -39,6 +39,8 @@ mod query;
 mod reports;
 mod schedule;
 mod settings;
+#[cfg(all(test, any(feature = "scatter", feature = "landmass")))]
+pub(crate) mod test_app;
 mod times;
 
 pub use components::{

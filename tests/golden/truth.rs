@@ -80,7 +80,7 @@ pub fn shoot(studio: &mut Studio, album: &mut Album) {
     set_textures(studio, own);
 }
 
-/// Draws all ground unlit and in flat colours, and returns the textures of before.
+/// Draws all ground unlit and in flat colours, and returns the previous textures.
 pub fn draw_flat(studio: &mut Studio) -> GroundTextures {
     let own = studio.app.world().resource::<GroundTextures>().clone();
     let textures = flat(studio);

@@ -396,6 +396,15 @@ mod of_looks {
         assert_eq!(log.count("nothing of it is drawn"), 0, "{}", log.text());
     }
 
+    /// A terrain whose material has a texture, which is not drawn.
+    fn spawn_textured(stage: &mut Stage) -> Entity {
+        let world = stage.app.world_mut();
+        let image = world.resource_mut::<Assets<Image>>().add(Image::default());
+        let material = StandardMaterial { base_color_texture: Some(image), ..default() };
+        let material = world.resource_mut::<Assets<StandardMaterial>>().add(material);
+        world.spawn((level(1.0), MeshMaterial3d(material))).id()
+    }
+
     #[test]
     fn materials_are_looked_at_once_they_are_propagated() {
         #[derive(Resource)]
@@ -405,11 +414,7 @@ mod of_looks {
         stage.app.configure_sets(Update, BurrowSystems::Propagate.run_if(|open: Res<Open>| open.0));
         let mut terrain = Entity::PLACEHOLDER;
         let (_, log) = logged(stage, |stage| {
-            let world = stage.app.world_mut();
-            let image = world.resource_mut::<Assets<Image>>().add(Image::default());
-            let material = StandardMaterial { base_color_texture: Some(image), ..default() };
-            let material = world.resource_mut::<Assets<StandardMaterial>>().add(material);
-            terrain = world.spawn((level(1.0), MeshMaterial3d(material))).id();
+            terrain = spawn_textured(stage);
             stage.settle();
             stage.frames(4);
             stage.app.world_mut().resource_mut::<Open>().0 = true;
@@ -455,11 +460,7 @@ mod of_looks {
     fn a_standard_material_with_textures() {
         let mut terrain = Entity::PLACEHOLDER;
         let (_, log) = logged(stage(), |stage| {
-            let world = stage.app.world_mut();
-            let image = world.resource_mut::<Assets<Image>>().add(Image::default());
-            let material = StandardMaterial { base_color_texture: Some(image), ..default() };
-            let material = world.resource_mut::<Assets<StandardMaterial>>().add(material);
-            terrain = world.spawn((level(1.0), MeshMaterial3d(material))).id();
+            terrain = spawn_textured(stage);
             stage.settle();
         });
         assert_logged(&log, &[terrain], "are not drawn", "texture coordinates");

@@ -100,7 +100,7 @@ fn assert_drawn_as_before(
     assert_eq!(stage.hash(terrain), hash);
     let opened = drawn(&mut stage, terrain);
     assert!(opened == before, "opened: {} triangles, and {} before", opened.len(), before.len());
-    // Steps of before are not saved; one of now leads back to what was opened.
+    // Steps are not saved, so there is nothing to undo yet. A new one leads back to what was opened.
     undo(&mut stage, terrain);
     assert_eq!(stage.hash(terrain), hash);
     dig_at(&mut stage, terrain, 33.0, 43.0, 7.0);
